@@ -314,7 +314,7 @@ class Result:
         Raises ValueError where nothing moves.
         """
         clip = Clip(video, seconds, rate)
-        return frames(self.edited.document, clip, keys=self.edited.keys)
+        return frames(self.edited.document, clip)
 
     def show(self, what: str = "photo") -> None:
         """Open a picture of the result in the system's viewer.

@@ -25,6 +25,7 @@ from .compose.plate.plate import build_plate
 from .deform.puppet import Puppet, puppet_of
 from .document import edits
 from .document.edge_edits import set_decontaminate
+from .document.key_edits import with_keys
 from .document.model import (
     AS_SEEN,
     Document,
@@ -163,7 +164,6 @@ class Edited:
     energies: dict[int, tuple[float, ...]]  # of the solves
     stopwatch: Stopwatch
     notes: tuple[str, ...] = ()  # what one should know about the result, each a sentence
-    keys: tuple[Document, ...] = ()  # the document in its further key poses
 
     @property
     def first(self) -> int:
@@ -271,8 +271,10 @@ def continue_script(
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
     edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
     notes = (*notes, *runner.guesses(document, run.puppets))
-    keys = runner.key_poses(document, 0, run.puppets[0], script) if script.key else ()
-    return replace(edited, notes=notes, keys=tuple(keys))
+    if script.key:
+        moments = (document, *runner.key_poses(document, 0, run.puppets[0], script))
+        edited = replace(edited, document=with_keys(edited.document, moments))
+    return replace(edited, notes=notes)
 
 
 class _Run:

@@ -339,7 +339,7 @@ def resample(document: Document, k: int, count: int) -> Document:
         raise EditError(f"{count} control points are too few to tell the handles apart")
     rig = item.rig.moved_to(np.asarray(KDTree(old).query(points)[1]))
     changed = replace(item, lifted=lifted, handles=handles, rig=rig, pose=None, base=Base())
-    return document.with_object(k, changed)
+    return document.with_object(k, replace(changed, keys=()))
 
 
 def set_pose(document: Document, k: int, pose: Pose | None) -> Document:

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import F32, F64, U8, Mask, Pixels, Selection, frozen
+from ..base.arrays import F32, F64, I32, U8, Mask, Pixels, Selection, frozen
 from ..base.camera import Camera
 from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
@@ -340,6 +340,18 @@ class DeformSettings:
 
 
 @dataclass(frozen=True, eq=False)
+class KeyPose:
+    """An object's pose and place at one moment of an animation."""
+
+    handles: tuple[Handle, ...] = ()
+    pose: Pose | None = None  # None: at rest
+    placement: Placement = Placement()
+    held: I32 | None = None  # the rig's, as shifts are
+    shifts: F64 | None = None
+    base: Base = field(default_factory=Base)
+
+
+@dataclass(frozen=True, eq=False)
 class EditObject:
     """An object of the photo with everything that was done to it."""
 
@@ -374,6 +386,7 @@ class EditObject:
     decontaminate: float = 0.0  # in [0, 1], how far the background's colour is out of its edge
     # (h, w, 3) the matte's foreground before that; None: as it is
     contaminated: F32 | None = None
+    keys: tuple[KeyPose, ...] = ()  # key poses of an animation, as many as the document has
 
     @property
     def found_matte(self) -> Matte | None:
@@ -439,9 +452,10 @@ class EditObject:
     def with_lifted(
         self, matte: Matte, lifted: LiftedObject, shape: LiftSettings | None = None
     ) -> EditObject:
-        """A new lift: handles, rig and pose named the old one's control points and are gone."""
+        """A new lift: handles, rig and poses named the old one's control points and are gone."""
         fresh = replace(
-            self, handles=(), rig=Rig(), pose=None, base=Base(), shape=shape or self.shape,
+            self, handles=(), rig=Rig(), pose=None, base=Base(), keys=(),
+            shape=shape or self.shape,
             contaminated=self.contaminated if matte is self.matte else None,
         )  # fmt: skip
         shaped = self.shaped if matte is self.matte else None

@@ -26,6 +26,7 @@ from ..document.model import (
     Document,
     EditObject,
     Handle,
+    KeyPose,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -88,11 +89,21 @@ def refitted(item: EditObject, matte: Matte, lifted: LiftedObject, camera: Camer
     rest = lifted.control_points.astype(np.float64)
     gaps, nearest = KDTree(old.control_points).query(rest, k=min(GUIDES, len(old.control_points)))
     gaps, nearest = gaps.reshape(len(rest), -1), nearest.reshape(len(rest), -1)
+
+    def moved(pose: Pose | None) -> Pose | None:
+        return None if pose is None else _pose_of(rest, old, pose, gaps, nearest)
+
+    def kept(key: KeyPose) -> KeyPose:
+        rig = replace(item.rig, held=key.held, shifts=key.shifts).moved_to(nearest[:, 0])
+        placement = _same_motion(key.placement, old, lifted, camera)
+        handles = _held(key.handles, lifted)
+        return KeyPose(handles, moved(key.pose), placement, rig.held, rig.shifts)
+
     return replace(
         item, matte=matte, contaminated=None, lifted=lifted, shaped=None,
         handles=_held(item.handles, lifted), rig=item.rig.moved_to(nearest[:, 0]),
-        pose=None if item.pose is None else _pose_of(rest, old, item.pose, gaps, nearest),
-        placement=_same_motion(item.placement, old, lifted, camera),
+        pose=moved(item.pose), placement=_same_motion(item.placement, old, lifted, camera),
+        keys=tuple(map(kept, item.keys)),
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from ..base.progress import Progress, silent
 from ..base.rotations import matrix_from_vector, vector_from_matrix
 from ..compose.composite import composite
 from ..deform.puppet import Puppet, puppet_of
+from ..document.key_edits import at_key, count_keys
 from ..document.model import Document, EditObject, Handle, Placement, Pose
 from ..document.shrink import shrunk
 from ..pictures.image import to_u8
@@ -52,24 +53,24 @@ class Clip:
         return max(round(self.seconds * self.rate), 1)
 
 
-def frames(
-    document: Document, clip: Clip, progress: Progress = silent, keys: Sequence[Document] = ()
-) -> Iterator[RGB]:
+def frames(document: Document, clip: Clip, progress: Progress = silent) -> Iterator[RGB]:
     """The clip's pictures (h, w, 3), all of one size, even in width and height.
 
-    `keys` are the document in its further key poses. Played again and again the clip has no jump.
-    Raises ValueError where nothing moves.
+    Played again and again the clip has no jump. Raises ValueError where nothing moves.
     """
     times = max(-(-max(document.photo.size) // clip.longest), 1)
+    keys: list[Document] = []
+    if clip.motion == "keys":
+        keys = [shrunk(at_key(document, n), times) for n in range(count_keys(document))]
+        if len(keys) < 2:
+            raise ValueError("a video through key poses needs at least two")
     small = shrunk(document, times)
-    if clip.motion == "keys" and not keys:
-        raise ValueError("there are no key poses, and a video through them needs at least one")
     if clip.motion == "morph" and not any(item.is_moved for item in small.objects):
         raise ValueError("nothing was moved, there is nothing to be seen")
     chosen = small.objects[clip.object].lifted if clip.object < len(small.objects) else None
     if clip.motion in ("sway", "turn") and chosen is None:
         raise ValueError("lift an object first, then it can turn")
-    film = _Film(small, tuple(shrunk(key, times) for key in keys))
+    film = _Film(small, keys)
     for k in range(clip.count):
         progress(k / clip.count, "drawing")
         if clip.motion == "morph":
@@ -109,9 +110,8 @@ def _yaw_at(time: float, motion: str) -> float:
 class _Film:
     """A document at other moments."""
 
-    def __init__(self, document: Document, keys: tuple[Document, ...] = ()) -> None:
-        self._document = document
-        self._stations = (document, *keys)
+    def __init__(self, document: Document, stations: Sequence[Document]) -> None:
+        self._document, self._stations = document, stations
         camera = document.photo.camera
         self.puppets: dict[int, Puppet] = {
             k: puppet_of(item, camera)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..base.arrays import F32
+from ..base.arrays import F32, RGB
 from ..base.pixels import crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
 from ..base.quoting import shown
@@ -133,9 +134,7 @@ class Export:
             write = encode_psd if format_of(path.name) is Format.PSD else encode_openraster
             return write(pile, merged)
         if what == "video":
-            keys = self.edited.keys if self.edited else ()
-            film = frames(self.document, self.clip, part(self.progress, 0.02, 0.95), keys)
-            return encode_video(film, self.clip.rate, path.suffix)
+            return encode_video(self._film(), self.clip.rate, path.suffix)
         if what in ("splats", "mesh"):
             return self._solid(what, path)
         return self._encoded(self.picture(what), path.suffix)
@@ -155,11 +154,21 @@ class Export:
         pixels = photo.pixels if self.document.plate is None else plate_picture(self.document)
         return replace(photo.picture, pixels=pixels)
 
-    def files(self, folder: Path) -> dict[Path, bytes]:
-        """Return the layers as PNG files as large as the photo, and all together.
+    def _film(self) -> Iterator[RGB]:
+        return frames(self.document, self.clip, part(self.progress, 0.02, 0.95))
 
-        They are numbered from below.
-        """
+    def files(self, what: str, folder: Path) -> dict[Path, bytes]:
+        """Return the frames of a video, or the layers, as the PNG files in a folder."""
+        if what == "layers":
+            return self._layer_files(folder)
+        stem = Path(self.document.photo.name).stem
+        return {
+            folder / f"{stem}-{n:04d}.png": encode_picture(Picture(frame), ".png")
+            for n, frame in enumerate(self._film())
+        }
+
+    def _layer_files(self, folder: Path) -> dict[Path, bytes]:
+        """As large as the photo, numbered from below, and all together."""
         merged, pile = self.layers(part(self.progress, 0.05, 0.7))
         pile = [layer for layer in pile if layer.is_shown]
         height, width = merged.pixels.shape[:2]

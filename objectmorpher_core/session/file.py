@@ -26,7 +26,7 @@ from ..base.camera import Camera
 from ..base.files import OutputError, reason_of, write_all
 from ..base.limits import SESSION_DOCUMENT, SESSION_OBJECTS
 from ..base.quoting import named, shown
-from ..document.model import SELECTED, Document, EditObject, Photo
+from ..document.model import SELECTED, Document, EditObject, KeyPose, Photo
 from ..document.settings import LEAST_FEATHER, MOST_FEATHER
 from ..pictures.image import ImageError, encode_picture, read_picture
 from .tree import ArrayError, SessionError, TreeReader, TreeWriter, read_npy
@@ -344,7 +344,7 @@ def _check_coverage(item: EditObject) -> None:
 def _check_lifted(item: EditObject) -> None:
     lifted = item.lifted
     if lifted is None:
-        if item.handles or item.pose is not None or not item.base.is_usual:
+        if item.handles or item.pose is not None or not item.base.is_usual or item.keys:
             raise ValueError("an object that is not lifted has handles")
         return
     count, nodes = len(lifted.gaussians), len(lifted.control_points)
@@ -356,7 +356,16 @@ def _check_lifted(item: EditObject) -> None:
         _same("sides", found, ((count, 2), (count, 2, 3), (count,), (3,)))
     _same("control_points", lifted.control_points.shape, (nodes, 3))
     _same("world_from_object", lifted.world_from_object.shape, (4, 4))
-    for handle in (*item.handles, *item.base.handles):
+    item.rig.check(nodes)
+    for state in (item, *item.keys):
+        _check_posed(state, nodes)
+    for key in item.keys:
+        replace(item.rig, held=key.held, shifts=key.shifts).check(nodes)
+
+
+def _check_posed(state: EditObject | KeyPose, nodes: int) -> None:
+    """Handles, poses and anchors are of an object of so many control points."""
+    for handle in (*state.handles, *state.base.handles):
         _same("handle", (handle.point.shape, handle.target.shape), ((3,), (3,)))
         if not 0 <= handle.control_point < nodes:
             raise ValueError(f"a handle names control point {handle.control_point} of {nodes}")
@@ -364,12 +373,11 @@ def _check_lifted(item: EditObject) -> None:
             _same("a handle's turn", handle.turn.shape, (3,))
         if not handle.softness >= 0:
             raise ValueError(f"a handle's softness is {handle.softness:g}")
-    item.rig.check(nodes)
-    for pose in (item.pose, item.base.pose):
+    for pose in (state.pose, state.base.pose):
         if pose is not None:
             _same("pose", pose.points.shape, (nodes, 3))
             _same("rotations", pose.rotations.shape, (nodes, 3, 3))
-    anchors = item.base.anchors
+    anchors = state.base.anchors
     if anchors is not None and (
         anchors.ndim != 1 or not ((anchors >= 0) & (anchors < nodes)).all()
     ):

@@ -13,12 +13,24 @@ from PIL import Image
 
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.key_edits import (
+    add_key,
+    at_key,
+    count_keys,
+    is_at_key,
+    remove_key,
+    replace_key,
+)
 from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.pose import Pose
 from objectmorpher_core.document.shrink import shrunk
 from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
 from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.scripting.animation import Clip, frames, share_at, station_at
+from objectmorpher_core.scripting.outputs import Export
 from objectmorpher_core.scripting.script import script_from
+from objectmorpher_core.session.file import decode_session, encode_session
+from objectmorpher_core.session.tree import SessionError
 from tests import shapes
 
 
@@ -158,11 +170,12 @@ def keyed() -> list[np.ndarray]:
     mask = shapes.mask("ellipse")
     photo = shapes.png(shapes.picture(mask))
     edited = run_script(photo, "photo.png", script, shapes.mask_png(mask))
-    assert len(edited.keys) == 3
-    clip = Clip("keys", seconds=1.6, rate=25)
-    found = list(frames(edited.document, clip, keys=edited.keys))
-    for number, key in enumerate((edited.document, *edited.keys)):
-        assert np.array_equal(found[number * 10], composite(key).pixels), "each pose is met exactly"
+    document = edited.document
+    assert count_keys(document) == 4 and is_at_key(document, 0)
+    found = list(frames(document, Clip("keys", seconds=1.6, rate=25)))
+    for number in range(4):
+        shown = composite(at_key(document, number)).pixels
+        assert np.array_equal(found[number * 10], shown), "each pose is met exactly"
     return found
 
 
@@ -195,5 +208,55 @@ def test_the_way_between_key_poses_is_eased():
 
 
 def test_a_film_without_key_poses_is_refused_in_a_sentence():
-    with pytest.raises(ValueError, match="no key poses"):
+    with pytest.raises(ValueError, match="needs at least two"):
         list(frames(edited(), Clip("keys")))
+
+
+def test_key_poses_are_kept_changed_and_saved():
+    rest = shapes.scene("ellipse").document()
+    document = add_key(edits.set_placement(add_key(rest), 0, Placement(turn=(20.0, 0.0, 0.0))))
+    posed = edited().objects[0]
+    document = document.with_object(0, replace(posed, keys=document.objects[0].keys))
+    document = add_key(document)
+    assert count_keys(document) == 3 and is_at_key(document, 2)
+    assert at_key(document, 0).objects[0].pose is None
+    assert at_key(document, 1).objects[0].placement.turn == (20.0, 0.0, 0.0)
+
+    opened = decode_session(encode_session(document))
+    for one, other in zip(opened.objects[0].keys, document.objects[0].keys, strict=True):
+        assert one.placement == other.placement
+        assert (one.pose is None) == (other.pose is None)
+        if one.pose is not None and other.pose is not None:
+            assert np.array_equal(one.pose.points, other.pose.points)
+    assert np.array_equal(composite(at_key(opened, 2)).pixels, composite(document).pixels)
+
+    at_rest = at_key(document, 0)
+    assert is_at_key(at_rest, 0) and not is_at_key(at_rest, 2)
+    changed = replace_key(at_rest, 2)
+    assert is_at_key(changed, 2) and count_keys(changed) == 3
+    assert count_keys(remove_key(changed, 1)) == 2
+    further = edits.add_object(document)
+    assert count_keys(further) == 3, "what is not lifted has none"
+    for _ in range(9):
+        document = add_key(document)
+    with pytest.raises(edits.EditError, match="at most 12"):
+        add_key(document)
+
+
+def test_a_session_with_key_poses_of_another_object_is_refused():
+    document = add_key(edited())
+    item = document.objects[0]
+    pose = item.keys[0].pose
+    short = Pose(pose.points[:-1], pose.rotations[:-1])
+    broken = replace(item, keys=(replace(item.keys[0], pose=short),))
+    with pytest.raises(SessionError, match="pose"):
+        decode_session(encode_session(document.with_object(0, broken)))
+
+
+def test_a_folder_of_frames_holds_the_film(tmp_path):
+    document = edited()
+    clip = Clip("sway", seconds=0.4, rate=10)
+    files = Export(document, clip=clip).files("video", tmp_path)
+    assert [path.name for path in files] == [f"made-{n:04d}.png" for n in range(4)]
+    for data, frame in zip(files.values(), frames(document, clip), strict=True):
+        assert np.array_equal(np.asarray(Image.open(io.BytesIO(data))), frame)

@@ -122,7 +122,8 @@ def run_edit(options: argparse.Namespace) -> None:
         out = Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
         check_outputs(inputs, {out: ENDINGS})
-        check_outputs(inputs, {path: _endings(EXTRAS[name]) for name, path in extras.items()})
+        files = {n: path for n, path in extras.items() if not _is_folder(n, path)}
+        check_outputs(inputs, {path: _endings(EXTRAS[name]) for name, path in files.items()})
         everything = [*outputs, out, *extras.values()]
         if len({path.resolve() for path in everything}) < len(everything):
             raise UsageError("two outputs have the same name")
@@ -153,14 +154,30 @@ def _edit_one(
             outputs = {out: encode_output("photo", edited, out)}
             for name, path in extras.items():
                 if name != "report":
-                    outputs[path] = encode_output(EXTRAS[name], edited, path, clip)
+                    outputs |= _encoded(name, edited, path, clip)
         if "report" in extras:
             outputs[extras["report"]] = json_bytes(edited.report())
     for note in edited.notes:
         sys.stderr.write(f"{PROGRAM}: {out}: {note}\n")
-    names = ", ".join(map(str, outputs))
+    names = ", ".join(map(str, (out, *extras.values())))
     seconds = edited.stopwatch.read()["total"]
     return outputs, f"wrote {names} in {seconds:.1f} s: {provenance(edited.composite)}"
+
+
+def _is_folder(name: str, path: Path) -> bool:
+    """Whether a video goes into a folder, as a picture a frame."""
+    return name == "save_video" and not path.suffix
+
+
+def _encoded(name: str, edited: Edited, path: Path, clip: Clip) -> dict[Path, bytes]:
+    """The files of a further output; a folder for frames is made where it is not there."""
+    if not _is_folder(name, path):
+        return {path: encode_output(EXTRAS[name], edited, path, clip)}
+    found = Export(edited.document, edited, clip=clip).files("video", path)
+    if not path.parent.is_dir():
+        raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
+    path.mkdir(exist_ok=True)
+    return found
 
 
 def _endings(what: str) -> tuple[str, ...]:
@@ -187,10 +204,15 @@ def run_replay(options: argparse.Namespace) -> None:
     wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
     if options.report:
         wanted[options.report] = (".json",)
+    video, clip = options.save_video, Clip(options.video, options.seconds)
+    if video and not _is_folder("save_video", video):
+        wanted[video] = _endings("video")
     check_outputs([options.session], wanted)
     with progress_bar("Opening") as progress:
         edited = replay(load_session(options.session), progress)
         outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
+        if video:
+            outputs |= _encoded("save_video", edited, video, clip)
         if options.report:
             outputs[options.report] = json_bytes(edited.report())
     write_all(outputs)

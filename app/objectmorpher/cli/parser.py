@@ -259,10 +259,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--save-depth", type=Path, metavar="FILE", help="nearness, 16 bit: white is nearest")
     add("--save-layers", type=Path, metavar="FILE",
         help="layers, for paint programs: .ora or .psd")  # fmt: skip
-    add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
-    add("--video", metavar="KIND", default="morph",
-        help="morph (photo to edit and back, the default), sway, turn or keys")  # fmt: skip
-    add("--seconds", type=float, default=4.0, metavar="S", help="length of the video, default 4")
+    _add_video(add)
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
     add("--save-mesh", type=Path, metavar="FILE.glb",
@@ -303,10 +300,19 @@ def _add_select(parser: argparse.ArgumentParser) -> None:
     _add_choosing(parser)
 
 
+def _add_video(add: Callable[..., object]) -> None:
+    add("--save-video", type=Path, metavar="FILE",
+        help="as .webm, .mp4, .gif or .webp; without an ending, a folder of PNG files")  # fmt: skip
+    add("--video", metavar="KIND", default="morph",
+        help="morph (photo to edit and back, the default), sway, turn or keys")  # fmt: skip
+    add("--seconds", type=float, default=4.0, metavar="S", help="length of the video, default 4")
+
+
 def _add_replay(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("session", type=Path, metavar="SESSION", help="an .omorph file")
     add("-o", "--out", type=Path, metavar="OUT", required=True, help="the edited photo")
+    _add_video(add)
     add(
         "--report",
         type=Path,

@@ -44,6 +44,16 @@ def _no_place_for_a_pin(editor: Editor) -> str | None:
     return no_lift(editor) or (None if is_there else t("Point at the object to pin it there"))
 
 
+def _no_key(editor: Editor) -> str | None:
+    is_there = editor.keying.count > 0
+    return no_lift(editor) or (None if is_there else t("There is no key pose yet"))
+
+
+def _nothing_to_replace(editor: Editor) -> str | None:
+    is_same = editor.keying.shown is not None
+    return _no_key(editor) or (t("Nothing has changed since") if is_same else None)
+
+
 def _send_back(editor: Editor) -> None:
     editor.posing.send_back(editor.posing.selected, t("Reset handle"))
 
@@ -77,4 +87,13 @@ COMMANDS: dict[str, Command] = {
         "Influence of the handle", "", _toggle_influence, no_lift,
         lambda e: e.view.pose.has_influence,
     ),
+    "add_key": Command(
+        "Add key pose", "", lambda e: e.keying.add(), lambda e: e.keying.why_not_add
+    ),
+    "next_key": Command("Next key pose", "", lambda e: e.keying.step(1), _no_key),
+    "previous_key": Command("Previous key pose", "", lambda e: e.keying.step(-1), _no_key),
+    "replace_key": Command(
+        "Replace key pose", "", lambda e: e.keying.replace(), _nothing_to_replace
+    ),
+    "remove_key": Command("Remove key pose", "", lambda e: e.keying.remove(), _no_key),
 }  # fmt: skip

@@ -28,6 +28,7 @@ from .intents.computing import Computing
 from .intents.edging import Edging
 from .intents.exporting import Exporting
 from .intents.hinting import Hinting
+from .intents.keying import Keying
 from .intents.landing import Landing
 from .intents.leaving_out import LeavingOut
 from .intents.looking import LookingIntents
@@ -59,6 +60,7 @@ class Editor(EditorState):
         self.posing, self.rigging = Posing(self), Rigging(self)
         self.handle_numbers = HandleNumbers(self, self.posing)
         self.placing, self.objects = Placing(self, self.posing), Objects(self, self.posing)
+        self.keying = Keying(self, self.posing)
         self.landing = Landing(self, self.objects)
         self.looking = LookingIntents(self, self.landing)
         self.tasks = Tasks(self, self.posing)

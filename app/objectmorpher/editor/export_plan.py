@@ -41,10 +41,12 @@ class VideoMotion(Enum):
     MORPH = "Photo to edit"
     SWAY = "Sway"
     TURN = "Turn around"
+    KEYS = "Key poses"
 
 
 FORMATS = {what: WRITTEN[what.key] for what in What} | {
     What.LAYERS: (*WRITTEN["layers"], Format.PNG),  # in a folder
+    What.VIDEO: (*WRITTEN["video"], Format.PNG),  # likewise
     What.SOLID: (*WRITTEN["mesh"], *WRITTEN["splats"]),
 }
 NAMES = {  # what follows the photo's name
@@ -65,7 +67,7 @@ class ExportPlan:
     """An export that was decided on."""
 
     what: What
-    path: Path  # the file; of layers as PNG the folder
+    path: Path  # the file; of layers and frames as PNG the folder
     object: int = 0  # index of the one whose cut-out or mask it is
     bits: int = 0  # 8 or 16 a channel; 0: the photo's own
     quality: int = 95  # of the format; 100 is lossless where it has that
@@ -78,5 +80,5 @@ class ExportPlan:
 
 
 def is_folder(what: What, format: Format | None) -> bool:
-    """Whether it is written as several files in a folder: layers that are not in one file."""
-    return what is What.LAYERS and format not in WRITTEN["layers"]
+    """Whether it is written as PNG files in a folder: layers, or frames, that are not one file."""
+    return what in (What.LAYERS, What.VIDEO) and format not in WRITTEN[what.key]

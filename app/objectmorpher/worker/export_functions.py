@@ -24,7 +24,7 @@ def write_export(document: Document, plan: ExportPlan, progress: Progress) -> No
         progress(0.95, "writing")
         write_all({plan.path: data})
         return
-    outputs = export.files(plan.path)
+    outputs = export.files(plan.what.key, plan.path)
     is_new = not plan.path.exists()
     try:
         make_folder(plan.path)

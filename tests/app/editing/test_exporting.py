@@ -267,3 +267,48 @@ def test_what_is_not_there_cannot_be_chosen(editor: Editor) -> None:
     for what in (What.CUTOUT, What.MASK, What.BACKGROUND, What.LAYERS, What.VIDEO, What.DEPTH):
         assert editor.exporting.why_not(what)
     editor.exporting.close()
+
+
+def test_key_poses_are_steps_and_become_a_film(moved: Editor) -> None:
+    exporting, keying = moved.exporting, moved.keying
+    exporting.open()
+    assert exporting.why_no_motion(VideoMotion.KEYS) == "Keep two key poses first, in Pose"
+    exporting.close()
+    run(moved, "add_key")
+    assert keying.count == 1 and keying.shown == 0
+    there = edits.set_placement(committed(moved), 0, Placement(move=(-20.0, 6.0)))
+    moved.apply("Move object", there)
+    run(moved, "add_key")
+    moved.apply("Move object", edits.set_placement(committed(moved), 0, Placement()))
+    assert keying.shown is None and keying.last == 1
+    run(moved, "replace_key")
+    assert keying.shown == 1 and committed(moved).objects[0].keys[1].placement.is_identity
+    moved.undo()
+    assert committed(moved).objects[0].keys[1].placement.move == (-20.0, 6.0)
+    run(moved, "next_key")
+    assert committed(moved).objects[0].placement.move == (25.0, -4.0)
+    run(moved, "next_key")
+    assert keying.shown == 1
+
+    exporting.open()
+    exporting.choose_what(What.VIDEO)
+    exporting.choose_motion(VideoMotion.KEYS)
+    exporting.choose_seconds(1.0)
+    exporting.choose_format(Format.PNG)
+    assert exporting.problem is None and exporting.is_folder
+    path = exporting.path
+    exporting.confirm()
+    wait_for_jobs(moved)
+    frames = [np.asarray(Image.open(file)) for file in sorted(path.iterdir())]
+    assert len(frames) == 25
+    first, between, last, back = (frames[n] for n in (0, 6, 12, 13))
+    assert np.array_equal(last, back), "the way back is the way there"
+    assert (first != between).any() and (between != last).any()
+    run(moved, "remove_key")
+    assert keying.count == 1
+
+
+def committed(editor: Editor) -> Document:
+    document = editor.committed
+    assert document is not None
+    return document

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from objectmorpher_core.document.key_edits import count_keys
 from objectmorpher_core.pictures.formats import LOSSLESS_AT_100
 from objectmorpher_core.pictures.guests import missing_jxl
 
@@ -109,6 +110,9 @@ class Exporting:
         if motion is VideoMotion.MORPH:
             is_moved = any(item.is_moved for item in objects)
             return None if is_moved else t("Move or pose an object first")
+        if motion is VideoMotion.KEYS and document is not None:
+            has_keys = count_keys(document) > 1
+            return None if has_keys else t("Keep two key poses first, in Pose")
         return self._why_no_shape()
 
     def why_no_format(self, format: Format) -> str | None:

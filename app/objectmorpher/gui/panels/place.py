@@ -24,6 +24,7 @@ from ..widgets.widgets import (
     number_field,
     tooltip,
 )
+from .animation import draw_timeline
 
 RESET = 24.0  # points, side of the button that resets a group
 DEPTHS = (-1.5, 3.0)  # object diameters, ends of the slider
@@ -80,6 +81,8 @@ def draw_place(editor: Editor) -> None:
         if group.title == "Position":
             _draw_depth(editor, placement)
         gap(12)
+    draw_timeline(editor)
+    gap(12)
     label = t(COMMANDS["reset_place"].label)
     command_button(editor, "reset_place", f"{Icon.RESET}  {label}")
 

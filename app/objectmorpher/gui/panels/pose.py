@@ -35,6 +35,7 @@ from ..widgets.widgets import (
     text_top,
     tooltip,
 )
+from .animation import draw_timeline
 from .brush import draw_radius
 
 STAYS = {Stays.FAR: "Far side", Stays.ELSE: "All else", Stays.NOTHING: "Only pins"}
@@ -61,6 +62,8 @@ def draw_pose(editor: Editor) -> None:
     gap(12)
     _draw_symmetry(editor)
     _draw_overlays(editor)
+    gap(12)
+    draw_timeline(editor)
     gap(12)
     half = half_width()
     command_button(editor, "reset_handles", t("All to rest"), half)

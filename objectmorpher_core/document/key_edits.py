@@ -1,0 +1,109 @@
+"""Key poses of an animation, as pure functions Document -> Document.
+
+A key pose is what each lifted object looked like when the pose was added. An object that is lifted
+later, or anew, has the pose that it has now wherever it has no key pose of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .edits import EditError
+from .model import Document, EditObject, KeyPose
+
+MOST = 12
+
+
+def count_keys(document: Document) -> int:
+    """How many key poses there are."""
+    return max((len(item.keys) for item in document.objects), default=0)
+
+
+def add_key(document: Document) -> Document:
+    """The pose of all objects as a further key pose, after the others. Raises EditError."""
+    count = count_keys(document)
+    if not any(item.lifted is not None for item in document.objects):
+        raise EditError("lift an object before keeping its pose")
+    if count >= MOST:
+        raise EditError(f"an animation has at most {MOST} key poses")
+    return _changed(document, lambda item: (*_keys(item, count), _now(item)))
+
+
+def replace_key(document: Document, number: int) -> Document:
+    """Key pose `number`, from 0, is the pose that the objects have now."""
+    count = count_keys(document)
+
+    def put(item: EditObject) -> tuple[KeyPose, ...]:
+        keys = _keys(item, count)
+        return (*keys[:number], _now(item), *keys[number + 1 :])
+
+    return _changed(document, put)
+
+
+def remove_key(document: Document, number: int) -> Document:
+    """Without key pose `number`, from 0."""
+    return _changed(document, lambda item: item.keys[:number] + item.keys[number + 1 :])
+
+
+def at_key(document: Document, number: int) -> Document:
+    """Every object as it is in key pose `number`, from 0."""
+    for k, item in enumerate(document.objects):
+        if number < len(item.keys):
+            document = document.with_object(k, _posed(item, item.keys[number]))
+    return document
+
+
+def with_keys(document: Document, moments: Sequence[Document]) -> Document:
+    """The document whose key poses are the `moments`, which differ from it in pose and place."""
+    objects = tuple(
+        item if item.lifted is None
+        else replace(item, keys=tuple(_now(moment.objects[k]) for moment in moments))
+        for k, item in enumerate(document.objects)
+    )  # fmt: skip
+    return replace(document, objects=objects)
+
+
+def is_at_key(document: Document, number: int) -> bool:
+    """Whether the objects are as they are in key pose `number`, from 0."""
+    return all(
+        _is_same(_now(item), item.keys[number])
+        for item in document.objects
+        if number < len(item.keys)
+    )
+
+
+def _now(item: EditObject) -> KeyPose:
+    rig = item.rig
+    return KeyPose(item.handles, item.pose, item.placement, rig.held, rig.shifts, item.base)
+
+
+def _posed(item: EditObject, key: KeyPose) -> EditObject:
+    """What was frozen since, or is not any more, is where it is at rest."""
+    is_alike = key.held is not None and np.array_equal(key.held, item.rig.held)
+    return replace(
+        item, handles=key.handles, pose=key.pose, placement=key.placement, base=key.base,
+        rig=replace(item.rig, shifts=key.shifts if is_alike else None),
+    )  # fmt: skip
+
+
+def _is_same(one: KeyPose, other: KeyPose) -> bool:
+    """Poses that were computed twice are two, though they may look the same."""
+    return one.placement == other.placement and (
+        one.pose is other.pose and one.handles == other.handles
+    )
+
+
+def _keys(item: EditObject, count: int) -> tuple[KeyPose, ...]:
+    """As many as there are; an object that is newer than some has its pose of now there."""
+    return item.keys + (_now(item),) * (count - len(item.keys))
+
+
+def _changed(document: Document, change: Callable[[EditObject], tuple[KeyPose, ...]]) -> Document:
+    objects = tuple(
+        item if item.lifted is None else replace(item, keys=change(item))
+        for item in document.objects
+    )
+    return replace(document, objects=objects)
