@@ -82,7 +82,8 @@ def _now(item: EditObject) -> KeyPose:
 
 def _posed(item: EditObject, key: KeyPose) -> EditObject:
     """What was frozen since, or is not any more, is where it is at rest."""
-    is_alike = key.held is not None and np.array_equal(key.held, item.rig.held)
+    was, held = key.held, item.rig.held
+    is_alike = was is not None and held is not None and np.array_equal(was, held)
     return replace(
         item, handles=key.handles, pose=key.pose, placement=key.placement, base=key.base,
         rig=replace(item.rig, shifts=key.shifts if is_alike else None),

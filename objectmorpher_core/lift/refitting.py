@@ -34,7 +34,7 @@ from ..document.model import (
     Placement,
     Plate,
 )
-from ..document.pose import Pose
+from ..document.pose import Base, Pose
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width, cut_out
 from . import LiftError, LiftSubject, load
@@ -93,17 +93,22 @@ def refitted(item: EditObject, matte: Matte, lifted: LiftedObject, camera: Camer
     def moved(pose: Pose | None) -> Pose | None:
         return None if pose is None else _pose_of(rest, old, pose, gaps, nearest)
 
+    def based(base: Base) -> Base:
+        is_anchor = None if base.anchors is None else np.isin(nearest[:, 0], base.anchors)
+        anchors = None if is_anchor is None else np.flatnonzero(is_anchor).astype(np.int32)
+        return Base(moved(base.pose), _held(base.handles, lifted), anchors)
+
     def kept(key: KeyPose) -> KeyPose:
         rig = replace(item.rig, held=key.held, shifts=key.shifts).moved_to(nearest[:, 0])
         placement = _same_motion(key.placement, old, lifted, camera)
         handles = _held(key.handles, lifted)
-        return KeyPose(handles, moved(key.pose), placement, rig.held, rig.shifts)
+        return KeyPose(handles, moved(key.pose), placement, rig.held, rig.shifts, based(key.base))
 
     return replace(
         item, matte=matte, contaminated=None, lifted=lifted, shaped=None,
         handles=_held(item.handles, lifted), rig=item.rig.moved_to(nearest[:, 0]),
         pose=moved(item.pose), placement=_same_motion(item.placement, old, lifted, camera),
-        keys=tuple(map(kept, item.keys)),
+        base=based(item.base), keys=tuple(map(kept, item.keys)),
     )  # fmt: skip
 
 

@@ -14,7 +14,9 @@ from objectmorpher_core.compose.plate.plate import hole_margin, plate_cover
 from objectmorpher_core.deform.puppet import Puppet, puppet_of
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
+from objectmorpher_core.document.key_edits import add_key
 from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
+from objectmorpher_core.document.pose import Base
 from objectmorpher_core.lift.refitting import Lifted, background_of, refit
 from objectmorpher_core.lift.registration.imported import ImportTarget
 from objectmorpher_core.pictures.image import Picture, encode_picture
@@ -103,8 +105,9 @@ def _footprint(before: Posed, after: Document, puppet: Puppet) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", quick(range(4), 1))
 def test_a_refined_mask_changes_nothing_but_what_it_concerns(posed, seed):
-    document, camera = posed.document, posed.document.photo.camera
-    old = document.objects[0]
+    camera, old = posed.document.photo.camera, posed.document.objects[0]
+    base = Base(old.pose, old.handles, np.arange(5))  # which names control points, too
+    document = add_key(posed.document.with_object(0, replace(old, base=base)))
     after = _refitted(document, _changed(old.mask, seed))
     item = after.objects[0]
     puppet = puppet_of(item, camera)
@@ -128,6 +131,8 @@ def test_a_refined_mask_changes_nothing_but_what_it_concerns(posed, seed):
     assert difference[~footprint].mean() < 1.0
     assert difference[footprint].max() > 8  # the change is seen
     assert item.shaped is None
+    assert np.array_equal(item.keys[0].pose.points, item.pose.points)
+    assert item.keys[0].placement == item.placement
     again = decode_session(encode_session(after))
     assert np.array_equal(composite(again).pixels, picture)
 
