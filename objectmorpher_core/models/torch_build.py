@@ -41,7 +41,7 @@ class TorchBuild:
 
 
 GB = 1e9
-SIZES = {  # download, disk: published wheels with the libraries they depend on, rounded up
+SIZES = {  # download, disk, with the libraries that come along; estimates, but for the CPU's
     "cu130": (2.8 * GB, 6.0 * GB), "cu128": (3.7 * GB, 7.8 * GB), "cu126": (3.5 * GB, 7.2 * GB),
     "rocm6.4": (5.0 * GB, 18.0 * GB), "cpu": (0.2 * GB, 0.8 * GB), "mps": (0.1 * GB, 0.5 * GB),
 }  # fmt: skip

@@ -90,7 +90,7 @@ def test_a_turn_of_one_number_is_a_yaw(folder):
 def test_key_poses_of_the_command_line_are_those_of_a_script(folder):
     said = ["--key", "turn=-20 scale=0.9", "--key", "handle=78,45:90,45 pin=78,80", "--key", ""]
     video = ["--video", "keys", "--seconds", "0.4", "--save-video"]
-    assert _edit("--turn", "20", *said, *video, "said.webp") == 0
+    assert _edit("--turn", "20", *said, *video, "said.webp", "--session", "e.omorph") == 0
     poses = [{"turn": [-20], "scale": 0.9}, {"handle": [{"at": [78, 45], "to": [90, 45]}],
              "pin": [[78, 80]]}, {}]  # fmt: skip
     Path("keys.json").write_text(json.dumps({"turn": [20], "key": poses}))
@@ -98,6 +98,11 @@ def test_key_poses_of_the_command_line_are_those_of_a_script(folder):
     assert Path("said.webp").read_bytes() == Path("read.webp").read_bytes()
     with Image.open("said.webp") as film:
         assert film.n_frames == 10
+    assert cli.main(["replay", "e.omorph", "-o", "again.png", *video, "again.webp"]) == 0
+    assert Path("again.webp").read_bytes() == Path("said.webp").read_bytes()
+    assert cli.main(["replay", "e.omorph", "-o", "again.png", *video, "frames"]) == 0
+    assert len(list(Path("frames").glob("*.png"))) == 10
+    assert cli.main(["replay", "e.omorph", "-o", "x.png", *video, "none/frames"]) == 1
 
 
 def test_nothing_to_do_gives_the_photo_back(folder):
