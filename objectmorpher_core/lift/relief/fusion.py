@@ -16,7 +16,7 @@ from .body import ReliefBody
 from .canvas import bilinear
 from .cuts import find_cuts
 from .integration import integrated
-from .lean import leaning
+from .lean import lacking
 from .shape_look import SeenShape
 from .silhouette import ReliefSilhouette
 from .standing import StandingSheet
@@ -186,8 +186,8 @@ def fused(
     own = None if cuts is None else 1 - front_share * (1 - np.clip(sheets.own, 0, 1))
     body = replace(body, middle=middle, front=front, back=back, cuts=cuts, own=own)
     unsure = float(sheets.front_error[outline.inside].mean()) / (USUAL_ERROR * seen.crop.side)
-    heeded = min(2 * float(front_share[outline.inside].mean()), trust)
-    return leaning(body, sheets.front, camera, heeded * min(unsure, 1.0))
+    heeded = min(2 * float(front_share[outline.inside].mean()), trust) * min(unsure, 1.0)
+    return replace(body, lacks=lacking(body, sheets.front, camera, heeded))
 
 
 def sheets_of(seen: SeenShape, camera: Camera, outline: ReliefSilhouette) -> Sheets:

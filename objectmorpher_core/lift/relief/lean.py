@@ -24,22 +24,34 @@ LEAST, SURELY = 0.15, 0.25  # ... of slopes from the first on, and all of it fro
 STEEPEST = 1.0  # slope that a body leans more at most
 
 
-def leaning(body: ReliefBody, seen: F64, camera: Camera, share: float) -> ReliefBody:
-    """Return `body` with what it lacks of the lean of `seen` (h, w), heights of its front, px.
+def lacking(body: ReliefBody, seen: F64, camera: Camera, share: float) -> F64:
+    """Return the slope (2,) that `body` lacks of the lean of `seen` (h, w), its front in px.
 
-    The slope is of the logarithm of the depth, in which a plane in perspective is nearly one. What
-    stands as a prism leans as its outline says. `share` in [0, 1] of that.
+    Of the logarithm of the depth, per tangent: in that a plane in perspective is nearly one. What
+    stands as a prism leans as its outline says. `share` in [0, 1] of what is lacking.
     """
-    outline, focal = body.silhouette, camera.focal
     if body.standing.prism is not None:
-        return body
-    tangents = (outline.photo_xy(outline.cells) - [camera.cx, camera.cy]) / focal
-    own, away = tangents[outline.inside], np.log(focal - seen[outline.inside])
-    middle = own.mean(0)
-    own = own - middle
+        return np.zeros(2)
+    outline = body.silhouette
+    own = _tangents(body, camera)[outline.inside]
+    own = own - own.mean(0)
+    away = np.log(camera.focal - seen[outline.inside])
     slope = np.linalg.lstsq(own.T @ own, own.T @ away, rcond=None)[0]
     slope *= share * LACKING * np.clip((np.abs(slope) - LEAST) / (SURELY - LEAST), 0, 1)
-    if not slope.any():
+    return slope * min(1.0, STEEPEST / max(float(np.linalg.norm(slope)), 1e-9))
+
+
+def leaning(body: ReliefBody, camera: Camera) -> ReliefBody:
+    """Return `body` with the slope that it lacks."""
+    if not body.lacks.any():
         return body
-    slope *= min(1.0, STEEPEST / float(np.linalg.norm(slope)))
-    return replace(body, middle=focal - (focal - body.middle) * np.exp((tangents - middle) @ slope))
+    tangents = _tangents(body, camera)
+    change = (tangents - tangents[body.silhouette.inside].mean(0)) @ body.lacks
+    middle = camera.focal - (camera.focal - body.middle) * np.exp(change)
+    return replace(body, middle=middle, lacks=np.zeros(2))
+
+
+def _tangents(body: ReliefBody, camera: Camera) -> F64:
+    """(h, w, 2) of a body's cells."""
+    outline = body.silhouette
+    return (outline.photo_xy(outline.cells) - [camera.cx, camera.cy]) / camera.focal

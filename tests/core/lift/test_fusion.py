@@ -14,7 +14,7 @@ from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
 from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
-from objectmorpher_core.lift.relief.lean import leaning
+from objectmorpher_core.lift.relief.lean import lacking, leaning
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.shape_look import SeenShape
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
@@ -142,11 +142,12 @@ def test_what_is_hardly_seen_to_lean_leans_more():
         return np.linalg.lstsq(own, depth - depth.mean(), rcond=None)[0]
 
     before = lean(body.middle)
-    for seen, lacks in (((0.4, 0.0), (0.48, 0.0)), ((0.1, -0.3), (0.0, -0.36))):
+    for seen, missing in (((0.4, 0.0), (0.48, 0.0)), ((0.1, -0.3), (0.0, -0.36))):
         front = camera.focal * (1 - np.exp(tangents @ np.array(seen)))
         for share in (0.5, 1.0):
-            after = lean(leaning(body, front, camera, share).middle)
-            np.testing.assert_allclose(after - before, share * np.array(lacks), atol=0.01)
+            lacks = lacking(body, front, camera, share)
+            after = lean(leaning(replace(body, lacks=lacks), camera).middle)
+            np.testing.assert_allclose(after - before, share * np.array(missing), atol=0.01)
 
 
 def test_twice_the_thickness_is_twice_the_thickness():

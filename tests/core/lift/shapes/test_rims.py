@@ -72,7 +72,7 @@ def test_a_plate_lies_as_its_rim_says() -> None:
     rims, found, (before, after), _ = _laid(_saucer())
     assert len(rims) == 1
     assert rims[0].normal @ UP > DEGREE
-    assert abs(before - 1) > 0.1, "what lacks is only guessed"
+    assert before < 0.6
     assert abs(after - 1) < 0.05
     half = found.back.half(found.silhouette.cells.reshape(-1, 2)).reshape(found.silhouette.shape)
     deep = half[found.silhouette.inside].max()
