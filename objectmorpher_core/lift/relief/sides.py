@@ -341,7 +341,10 @@ def _alike(colors: F32, wanted: F32, known: F32, sure: F32) -> F64:
         for change in (known - cv2.GaussianBlur(known, (0, 0), COARSE), wanted - colors)
     )
     least = OTHER + float(np.median(usual[sure > HALF]))
-    return np.exp(-((off.astype(np.float64) / least) ** 4))
+    alike = np.exp(-((off.astype(np.float64) / least) ** 4))
+    patch = np.ones((2 * RIM - 1,) * 2, np.uint8)
+    alike = cv2.erode(cv2.morphologyEx(alike, cv2.MORPH_CLOSE, patch), patch)  # it is of one part
+    return np.asarray(cv2.GaussianBlur(alike, (0, 0), NEARBY), np.float64)
 
 
 def _pinned(colors: F32, hole: Mask, known: F32, sure: F32) -> F32:
