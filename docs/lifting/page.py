@@ -104,10 +104,37 @@ nearest to a front, its *shape* what is left of it, PSNR in dB:
 | the true front | 22.5 | 19.5 | 20.8 | 22.6 | 18.9 | 21.4 |
 
 So lean and shape cost about as much, and each alone gives a fifth to a third of what both together
-do; the depth scale costs nothing. Where nothing is recognised the network sees too little lean,
-nearly always: of the bunny 8 of 46 degrees, of the figure 3 of 21. A factor that makes up for it
-has not been calibrated on other things than these, and is left out. The other tables of this page,
-and the row of the network in them, are older than plain shapes.
+do; the depth scale costs nothing. The other tables of this page, and the row of the network in
+them, are older than plain shapes.
+
+Where nothing is recognised the network sees too little lean. On 150 views of meshes of pybullet
+that this page does not use (parts of robots, and random ones) and of the solids of `evaluate
+truth`, none of them recognised, what is true is 1.8 times what it sees up and down, and 1.7 times
+to the sides; the blend with an upright silhouette takes another part of it away. But what it sees
+to lean by less than about ten degrees is as often something else: made larger, it is worse. From 9
+degrees on, and wholly from 14 on, 1.2 times what is seen is added, a number chosen on those views.
+The error of the slopes, root mean square, falls from 0.38 to 0.33 to the sides and from 0.42 to
+0.33 up and down. That small leans are left was decided when figure and teddy had lost 0.7 dB by a
+plain factor, and bunny, hand and lamp had won. A turn feels small errors most, and those stay: so
+little is gained where the true lean would give much. Of the ten, only the bunny changes by it, of
+those held out hand and lamp. The rest is of plates, which have one arch beneath their rim now, of
+cups, beside whose lip no walls hang, and of hidden sides, which keep to the colours of their own
+part. PSNR in dB and wobble before and after, the means of both last:
+
+|  | before: turn 20 | turn 35 | pitch 20 | after: turn 20 | turn 35 | pitch 20 |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: |
+| bunny | 13.7, 0.85 | 13.0, 0.77 | 14.6, 1.22 | 14.7, 0.84 | 12.7, 0.78 | 15.5, 1.21 |
+| plate | 21.8, 1.47 | 20.1, 1.64 | 19.4, 1.57 | 23.2, 1.48 | 22.3, 1.55 | 21.5, 1.43 |
+| cup | 27.0, 1.62 | 24.6, 1.73 | 27.1, 2.09 | 27.3, 1.45 | 24.7, 1.70 | 28.0, 1.63 |
+| lamp | 17.6, 1.20 | 15.4, 1.15 | 15.1, 1.26 | 18.3, 1.21 | 15.9, 1.14 | 15.2, 1.27 |
+| hand | 17.7, 1.25 | 15.0, 1.10 | 17.4, 1.22 | 18.3, 1.24 | 15.6, 1.22 | 19.0, 1.30 |
+| domino | 17.5, 1.58 | 14.2, 1.51 | 14.5, 2.23 | 17.3, 1.58 | 14.0, 1.51 | 14.9, 2.23 |
+| *ten* | 19.0, 1.32 | 17.3, 1.38 | 18.2, 1.35 | 19.2, 1.31 | 17.3, 1.38 | 18.3, 1.35 |
+| *held out* | 19.3, 1.36 | 16.8, 1.35 | 18.6, 1.66 | 19.5, 1.35 | 17.1, 1.35 | 19.1, 1.61 |
+
+Plate and cup were looked at while that was made. Three of the twenty lose more than 0.1 dB: the
+bunny when turned by 35 degrees, and ring and domino, 0.1 to 0.3 dB, whose sides have less of their
+pattern.
 
 With rims, two of the ten that are held out changed, PSNR in dB before and after; none of the other
 eighteen solids is taken for a plate or a cup. Nothing was chosen on the two, but that there is such
@@ -152,18 +179,18 @@ object hides of another counts as invented although it may stay hidden.
 
 ![Sixteen photos, turned by 15, 25 and 35 degrees to both sides and pitched by 20](turned.jpg)
 
-That sheet is older than rims. With them, the coffee is:
-
-![The coffee, turned by as much](turned-coffee.jpg)
-
-Up to 25 degrees the flower, the rocket, the bowl and the logo look right, and the coffee nearly so:
-its cup and saucer keep their ellipses, and the saucer goes on behind the cup. Its handle and spoon
-lie flat on the saucer, the lip's photo is stretched down the cup's side where that turns into view,
-and the rim of the part that was hidden is a little ragged. What does not look right: at 25 degrees
-a band along the cheek of the cat, and what is invented behind the head of the astronaut; the fig in
-the bowl slides at 35; the retina and the colour ball, which fill their photos, get corners; the
-drawn horse is flat, and is taken for a round one; the pagoda is selected in part, and leans; of the
-moon and of the cell a piece of ground is selected, which has a ragged edge.
+Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right, the astronaut
+and the coffee nearly so: her head is a little deep, and what is not shown of hair and collar is
+plain; the coffee's handle and spoon lie flat on the saucer, the lip's photo is stretched down the
+cup's side where that turns into view, and the rim of the part that was hidden is a little ragged.
+The horse is a sheet, as it was drawn. What does not look right: from 25 degrees on a band along the
+cheek of the cat, whose outline is wavy there; the fig in the bowl becomes narrow, and slides at 35;
+the photographer's back has a grey band; the clock, which is blurred, has a double edge; the retina
+and the colour ball, which fill their photos, get corners; the pagoda is selected in part, and
+leans; of the moon and of the cell a piece of ground is selected, which has a ragged edge. Nothing
+is torn. Streaks or flat places are more than 2 % of what is newly shown on all but horse, coins,
+moon and logo, and wobble is above 1.2 of coffee (1.6), colour ball (1.5) and bowl (1.25) at the
+worst of eight turns.
 """
 STEREO = """## A photographed thing whose shape is known
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,7 @@ class ReliefBody:
     own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
     behind: Behind | None = None  # what its shape hides from the photo; None: nothing is known
     kind: str = "free"  # what it was recognised as: see `shapes`
+    lacks: F64 = field(default_factory=lambda: np.zeros(2))  # slope: see `lean`
     doubt: float = 0.0  # x extent, expected error of the front's depth; 0: nobody said
 
     @staticmethod

@@ -16,6 +16,7 @@ from .body import ReliefBody
 from .canvas import bilinear
 from .cuts import find_cuts
 from .integration import integrated
+from .lean import lacking
 from .shape_look import SeenShape
 from .silhouette import ReliefSilhouette
 from .standing import StandingSheet
@@ -104,6 +105,7 @@ ROUND = (0.35, 0.6)  # cosine to the ray, near the outline: the surface turns aw
 RIM = 0.035  # x extent from the outline, over which a body that is round there closes
 ROUND_WIDTH = 0.1  # x extent, over which a round body is one multiple of the silhouette's
 COMB = 1.5  # px of the crop, over which what the network says is evened
+USUAL_ERROR = 0.04  # crop units of the front: who is surer than that sees how things lean
 INNER = 1.5  # px of the crop from the outline, nearer to which its pixels mix
 
 
@@ -182,7 +184,10 @@ def fused(
     front = sides[0].towards(np.maximum(whole, 0.0), outline.inside.astype(np.float64))
     back = sides[1]
     own = None if cuts is None else 1 - front_share * (1 - np.clip(sheets.own, 0, 1))
-    return replace(body, middle=middle, front=front, back=back, cuts=cuts, own=own)
+    body = replace(body, middle=middle, front=front, back=back, cuts=cuts, own=own)
+    unsure = float(sheets.front_error[outline.inside].mean()) / (USUAL_ERROR * seen.crop.side)
+    heeded = min(2 * float(front_share[outline.inside].mean()), trust) * min(unsure, 1.0)
+    return replace(body, lacks=lacking(body, sheets.front, camera, heeded))
 
 
 def sheets_of(seen: SeenShape, camera: Camera, outline: ReliefSilhouette) -> Sheets:

@@ -31,6 +31,7 @@ from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
+from .lean import leaning
 from .mirror import MirrorAxis, find_axis
 from .sides import with_sides
 from .silhouette import ReliefSilhouette
@@ -159,10 +160,10 @@ class ReliefLifter:
 def _recognised(
     body: ReliefBody, seen: shape_look.SeenShape, camera: Camera, settings: LiftSettings
 ) -> ReliefBody:
-    """`body` as the plain shape that it looks like, if any."""
+    """`body` as the plain shape that it looks like, else leaning as far as things do."""
     shape = recognised(seen, settings.kind)
     if shape is None or _contradicts(shape, body, settings):
-        return body
+        return leaning(body, camera)
     return completed(body, shape, camera, settings.thickness, settings.trust)
 
 

@@ -53,6 +53,8 @@ BESIDE = 3.0  # ... that is as many times as far from the hole as the hole is de
 ELSEWHERE = 300.0  # squared levels that one in the photo costs
 KEPT = 0.85  # share of the coarse colours of a side that stays
 COARSE = 5.0  # small px, of what is coarse
+NEARBY = 2.0  # small px, over which colours are compared
+OTHER = 30.0  # levels, by which the coarse colours of a picture of something else are off
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
 MOST_TONED = 25.0  # levels, by which a side's tone follows the photo's where they meet
@@ -322,7 +324,27 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
     colors = np.clip(colors, 0, 255).astype(np.float32)
     filled = with_detail(crop, whole, colors, completion.sources)
+    share = _alike(completion.colors, coarse, small, sure)
+    share = np.where(whole, cv2.resize(share, hole.shape[::-1]), 1.0)[..., None]
+    filled = np.rint(crop + share * (filled.astype(np.float32) - crop))
     return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
+
+
+def _alike(colors: F32, wanted: F32, known: F32, sure: F32) -> F64:
+    """(h, w) in [0, 1] where `colors` (h, w, 3) that were invented are about those `wanted`.
+
+    Elsewhere nothing was found that has them, and plain ones look better than another thing's. What
+    is `known` and `sure` (h, w) has as much contrast as may be.
+    """
+    usual, off = (
+        np.linalg.norm(cv2.GaussianBlur(change, (0, 0), NEARBY), axis=-1)
+        for change in (known - cv2.GaussianBlur(known, (0, 0), COARSE), wanted - colors)
+    )
+    least = OTHER + float(np.median(usual[sure > HALF]))
+    alike = np.exp(-((off.astype(np.float64) / least) ** 4))
+    patch = np.ones((2 * RIM - 1,) * 2, np.uint8)
+    alike = cv2.erode(cv2.morphologyEx(alike, cv2.MORPH_CLOSE, patch), patch)  # it is of one part
+    return np.asarray(cv2.GaussianBlur(alike, (0, 0), NEARBY), np.float64)
 
 
 def _pinned(colors: F32, hole: Mask, known: F32, sure: F32) -> F32:

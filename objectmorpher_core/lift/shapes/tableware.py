@@ -27,7 +27,11 @@ from .evidence import Evidence
 from .rims import Rim
 from .solids import AROUND, FINE, revolved
 
+CLOSED = 3.0  # cells from the outline, within which nothing lies behind what stands
 NEAR = 1.5  # cells from a rim's picture, where the front is on it
+WHOLE = 0.8  # share of an outline that is on its rim, from which all lies within it
+EVENED = 0.1  # x its radius: so far from its rim it becomes the rim's circle
+AMID = 0.5  # x the arch's height, from where on thickness is compared
 LEAST_KNOWN = 60  # cells on rims
 PULL = 100.0  # x a step's weight, that a place on a rim has
 SOLVING = 300, 1e-4  # rounds of conjugate gradients, and when the residual is small enough
@@ -68,7 +72,33 @@ def laid(
     rest = rest + solved(rest, PULL * known, zero, zero, *steps, *SOLVING)
     after = before + whole + rest.ravel()[nearest_in(outline.inside)]
     after += float(np.median((before - after)[outline.inside]))
-    return replace(body, middle=body.middle + np.exp(before) - np.exp(after))
+    body = replace(body, middle=body.middle + np.exp(before) - np.exp(after))
+    edge = outline.inside & (outline.depth < NEAR * outline.cell)
+    is_whole = (known & edge).sum() > WHOLE * edge.sum()
+    return _bottomed(body, rims[0], tangents, camera.focal) if is_whole else body
+
+
+def _bottomed(body: ReliefBody, rim: Rim, tangents: F64, focal: float) -> ReliefBody:
+    """`body`, all of which lies within its rim, with one arch beneath it.
+
+    It is as deep as the body is thick. What is seen stays, but for what is nearly on the rim.
+    """
+    outline = body.silhouette
+    at = outline.cells.reshape(-1, 2)
+    before, behind = (side.half(at).reshape(outline.shape) for side in (body.front, body.back))
+    inward = -rim.outside(tangents) * rim.centre[2] / rim.radius  # from 0 at the rim to 1
+    arch = 1 - (1 - np.clip(inward, 0, 1)) ** 2
+    amid, ring = outline.inside & (arch > AMID), outline.inside & (inward < EVENED)
+    if not (amid.any() and ring.any()):
+        return body
+    half = 0.5 * float(np.median(((before + behind) / np.maximum(arch, AMID))[amid])) * arch
+    front, plane = np.log(focal - body.middle - before), np.log(rim.depth(tangents))
+    off = front - plane
+    level = float(np.median(off[ring]))
+    share = np.clip(inward / EVENED, 0, 1) * outline.inside
+    front = focal - np.exp(plane + level + share * (off - level))
+    sides = [side.towards(half, np.ones(outline.shape)) for side in (body.front, body.back)]
+    return replace(body, middle=front - half, front=sides[0], back=sides[1])
 
 
 def _front(body: ReliefBody, camera: Camera) -> tuple[F64, F64]:
@@ -109,10 +139,10 @@ class Stack(NamedTuple):
         vessel = drawn(_vessel(rims, Evidence.of(seen)), grid)
         stands = outline.inside & (vessel.near > np.maximum(dish.near, 1e-9))
         lies = outline.inside & (dish.near > 0)
-        if (stands & lies).sum() < LEAST_KNOWN:
-            return None
         wide = rims[1].radius / rims[1].centre[2] * camera.focal  # px
         stands = _edged(stands, outline, BAND * wide, subject.pixels)
+        # Where what stands is the object's outline it closes: no wall reaches to the dish behind.
+        lies &= ~(stands & (outline.depth < CLOSED * outline.cell))
         if (stands & lies).sum() < LEAST_KNOWN:
             return None
         vessel_near, vessel_far = (_log_depth(part) for part in (vessel.near, vessel.far))
@@ -299,11 +329,17 @@ def _vessel(rims: list[Rim], evidence: Evidence) -> Mesh:
 
 
 def _cuts(ends: list[tuple[F64, Mask]], outline: ReliefSilhouette) -> Cuts:
-    """Where sheets (h, w) px fall off at the ends of parts (h, w)."""
-    least, inside = LEAST_STEP * outline.extent, outline.inside
-    down, right = inside[1:] & inside[:-1], inside[:, 1:] & inside[:, :-1]
-    is_down, is_right = np.zeros(down.shape, bool), np.zeros(right.shape, bool)
-    for sheet, part in ends:
-        is_down |= (part[1:] != part[:-1]) & (np.abs(np.diff(sheet, axis=0)) > least)
-        is_right |= (part[:, 1:] != part[:, :-1]) & (np.abs(np.diff(sheet, axis=1)) > least)
-    return Cuts(down & is_down, right & is_right)
+    """Where sheets (h, w) px fall off at the ends of parts (h, w), also beyond the outline."""
+    least, beyond = LEAST_STEP * outline.extent, ~outline.inside
+    found = []
+    for axis in (0, 1):
+        a, b = (
+            tuple(slice(k, k - 1 or None) if n == axis else slice(None) for n in (0, 1))
+            for k in (0, 1)
+        )
+        cut = np.zeros(beyond[a].shape, bool)
+        for sheet, part in ends:
+            is_end = (part[a] != part[b]) | beyond[a] | beyond[b]
+            cut |= is_end & (np.abs(sheet[b] - sheet[a]) > least)
+        found.append(cut)
+    return Cuts(*found)

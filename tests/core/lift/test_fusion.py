@@ -14,6 +14,7 @@ from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
 from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.lean import lacking, leaning
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.shape_look import SeenShape
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
@@ -126,6 +127,27 @@ def test_a_ball_closes_at_its_outline_and_a_slab_ends_there():
         middles, _ = found.silhouette.contour
         rims.append(np.median(found.height(middles, FRONT) - found.height(middles, BACK)) / SIDE)
     assert rims[0] < 0.1 and rims[1] > 0.2
+
+
+def test_what_is_hardly_seen_to_lean_leans_more():
+    """A ball whose front leans as a network that is not sure sees it."""
+    y, x = np.mgrid[:200, :200] + 0.5
+    outline = ReliefSilhouette.of((x - 100) ** 2 + (y - 100) ** 2 < 70**2)
+    camera = Camera.from_fov(200, 200)
+    body = ReliefBody.of(outline, camera, LiftSettings())
+    tangents = (outline.photo_xy(outline.cells) - 100) / camera.focal
+
+    def lean(height: np.ndarray) -> np.ndarray:
+        own, depth = tangents[outline.inside], np.log(camera.focal - height[outline.inside])
+        return np.linalg.lstsq(own, depth - depth.mean(), rcond=None)[0]
+
+    before = lean(body.middle)
+    for seen, missing in (((0.4, 0.0), (0.48, 0.0)), ((0.1, -0.3), (0.0, -0.36))):
+        front = camera.focal * (1 - np.exp(tangents @ np.array(seen)))
+        for share in (0.5, 1.0):
+            lacks = lacking(body, front, camera, share)
+            after = lean(leaning(replace(body, lacks=lacks), camera).middle)
+            np.testing.assert_allclose(after - before, share * np.array(missing), atol=0.01)
 
 
 def test_twice_the_thickness_is_twice_the_thickness():

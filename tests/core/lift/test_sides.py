@@ -156,3 +156,23 @@ def test_trust_falls_with_every_degree(scene):
     assert found[-1].sign == "guesswork" and found[-1].invented > 0.95
     file = Puppet(replace(scene.lifted, backend="imported"), DeformSettings(), scene.camera)
     assert trust_in(file.posed(None, TURN)).sign == "fine", "it came with its back"
+
+
+def test_a_side_has_the_colours_of_its_own_part():
+    """A small brown head on a red body, of which far more patches are known."""
+    y, x = np.mgrid[:260, :240] + 0.5
+    head = (x - 120) ** 2 + (y - 62) ** 2 < 13**2
+    body = ((x - 120) / 95) ** 2 + ((y - 165) / 85) ** 2 < 1
+    noise = np.random.default_rng(0).random((260, 240)).astype(np.float32)
+    grain = cv2.GaussianBlur(noise, (0, 0), 1.2)[..., None]
+    grain = (0.5 + (grain - grain.mean()) / (3 * grain.std())).clip(0, 1)
+    colours = np.where(head[..., None], (150, 110, 60), (230, 70, 40)) * (0.6 + 0.4 * grain)
+    inside = head | body | ((np.abs(x - 120) < 5) & (y > 60) & (y < 100))
+    pixels = np.where(inside[..., None], colours, 20).astype(np.uint8)
+    scene = shapes.lifted_scene(pixels, inside, 4000)
+    for yaw in (40.0, -40.0):
+        shown = _drawn(scene, scene.lifted, Placement(turn=(yaw, 0.0, 0.0)))
+        new = (shown.from_photo < 0.1 * shown.alpha) & (shown.alpha > 0.98)
+        new[72:] = False
+        assert new.sum() > 40
+        assert (shown.color[new][:, 1] > 0.5 * shown.color[new][:, 0]).mean() > 0.97

@@ -69,11 +69,16 @@ def _laid(mesh: Mesh):
 
 
 def test_a_plate_lies_as_its_rim_says() -> None:
-    rims, _, (before, after), _ = _laid(_saucer())
+    rims, found, (before, after), _ = _laid(_saucer())
     assert len(rims) == 1
     assert rims[0].normal @ UP > DEGREE
     assert before < 0.6
     assert abs(after - 1) < 0.05
+    half = found.back.half(found.silhouette.cells.reshape(-1, 2)).reshape(found.silhouette.shape)
+    deep = half[found.silhouette.inside].max()
+    steps = np.hypot(*np.gradient(half, found.silhouette.cell))[found.silhouette.inside]
+    assert deep > 0
+    assert steps.max() < 12 * deep / found.silhouette.extent, "one arch, without waves or a wall"
 
 
 def test_a_cup_stands_on_a_saucer_that_goes_on_behind_it() -> None:
