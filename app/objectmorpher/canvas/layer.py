@@ -128,6 +128,9 @@ def in_light(shown: CanvasLayer, look: Lit, place: tuple[float, ...]) -> CanvasL
         rgba = look.relit.lit_rgba(rgba, *corner)
     if look.grain is not None:  # last: it is as strong as the photo's at the brightness shown
         rgba, gain = look.grain.grained_rgba(lit_rgba(rgba, gain), *corner), NEUTRAL
+    if look.opacity < 1:
+        rgba = (lit_rgba(rgba, gain) * np.float32(look.opacity) + 0.5).astype(np.uint8)
+        gain = NEUTRAL
     return replace(shown, rgba=rgba, gain=gain)
 
 

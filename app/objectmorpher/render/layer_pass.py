@@ -179,7 +179,8 @@ class LayerPass:
 
 
 def _appearance(thing: CanvasLayer | SplatObject) -> dict[str, Any]:
-    return {"opacity": TINT if thing.is_tint else 1.0, "gain": thing.gain}
+    own = thing.opacity if isinstance(thing, SplatObject) else 1.0
+    return {"opacity": TINT if thing.is_tint else own, "gain": thing.gain}
 
 
 def _defines(scene: Scene, is_marked: bool, is_over: bool) -> list[str]:

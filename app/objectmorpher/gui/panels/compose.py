@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core import compose
 from objectmorpher_core.document.settings import (
     LEAST_FEATHER,
+    MOST_EXPOSURE,
     MOST_FEATHER,
     MOST_SHADOW,
     USUAL_DEFOCUS,
@@ -65,6 +66,8 @@ def draw_compose(editor: Editor) -> None:
     _draw_shadow(editor)
     rule()
     _draw_light(editor)
+    rule()
+    _draw_finish(editor)
     rule()
     draw_network(editor)
     rule()
@@ -249,6 +252,23 @@ def _draw_light(editor: Editor) -> None:
     note(t("Light around its new place; light that stays where it was while it turns."))
     note(t("Grain: the photo's own, where moving the object has smoothed it."))
     note(t("Focus: nearer or farther, as blurred as the photo is there."))
+
+
+def _draw_finish(editor: Editor) -> None:
+    heading(t("Object"))
+    assert editor.object is not None
+    finish, preview = editor.object.finish, editor.composing.preview_finish
+    rows = (
+        (Number(t("Opacity"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100.0), "opacity", 100.0),
+        (Number(t("Exposure"), "%+.2f", 0.01, 0.25, 0.0, -MOST_EXPOSURE, MOST_EXPOSURE),
+         "exposure", 1.0),
+        (Number(t("Warmth"), "%+.0f", 0.5, 5.0, 0.0, -100.0, 100.0), "warmth", 100.0),
+    )  # fmt: skip
+    for number, name, unit in rows:
+        change = number_field(number, unit * getattr(finish, name))
+        changed = replace(finish, **{name: change.value / unit})
+        _take(editor, change, lambda changed=changed: preview(changed), t("Look of object"))
+    note(t("Exposure in stops; warmth from blue to amber."))
 
 
 def _draw_edge(editor: Editor) -> None:

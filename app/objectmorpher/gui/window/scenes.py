@@ -131,6 +131,6 @@ def splat_objects(document: Document, frame: Frame) -> tuple[SplatObject | Canva
         )  # fmt: skip
         if not part.is_painted:
             light = {"gain": look.gain, "relit": look.relit, "grain": look.grain}
-            item = replace(item, **light, blur=look.blur)
+            item = replace(item, **light, blur=look.blur, opacity=look.opacity)
         found.append(item)
     return tuple(found)
