@@ -446,7 +446,8 @@ def set_defocus(document: Document, k: int, defocus: float) -> Document:
 
 def _with_share(document: Document, k: int, name: str, share: float) -> Document:
     if not 0 <= share <= 1:
-        raise EditError(f"a {name} of {share:g} is not between 0 and 1")
+        what = "relighting" if name == "relight" else name
+        raise EditError(f"a {what} of {share:g} is not between 0 and 1")
     return document.with_object(k, replace(document.objects[k], **{name: float(share)}))
 
 

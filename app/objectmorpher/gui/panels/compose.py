@@ -61,13 +61,13 @@ def draw_compose(editor: Editor) -> None:
     if not editor.is_lifted:
         note(t("Lift an object first."))
         return
+    _draw_finish(editor)  # first: what it changes adds fields below
+    rule()
     _draw_background(editor)
     rule()
     _draw_shadow(editor)
     rule()
     _draw_light(editor)
-    rule()
-    _draw_finish(editor)
     rule()
     draw_network(editor)
     rule()
