@@ -38,7 +38,7 @@ from .blend import (
 )
 from .blend import STILL as STILL
 from .light.defocus import blurred, reach_of
-from .light.harmonize import lit
+from .light.harmonize import lit, saturated
 from .light.lighting import NOTHING, Lighting, Lit
 from .light.lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
@@ -245,6 +245,7 @@ class _Drawing:
             color = look.relit.lit(color, picture.alpha, self.box[0], top)
         if look.grain is not None:
             color = look.grain.grained(color, picture.alpha, self.box[0], top)
+        color = saturated(color, picture.alpha, look.saturation)
         if (share := np.float32(look.opacity)) == 1:
             return replace(picture, color=color)
         return replace(

@@ -72,6 +72,7 @@ class Shadow:
 # How an object looks otherwise than in the photo, as of a layer of a paint program.
 
 MOST_EXPOSURE = 3.0  # stops, up or down
+MOST_SATURATION = 2.0
 GAMMA = 2.2  # of encoded values: a stop of linear light is a factor of them
 WARMTH = 0.5  # stops, by which red rises and blue falls at a warmth of 1
 
@@ -83,6 +84,7 @@ class Finish:
     opacity: float = 1.0  # in [0, 1]
     exposure: float = 0.0  # stops of light
     warmth: float = 0.0  # in [-1, 1], from blue to amber
+    saturation: float = 1.0  # x as far from grey, in [0, 2]
 
     def check(self) -> None:
         """Raises ValueError where a number makes no sense."""
@@ -95,6 +97,10 @@ class Finish:
             )
         if not -1 <= self.warmth <= 1:
             raise ValueError(f"a warmth of {self.warmth:g} is not between -1 and 1")
+        if not 0 <= self.saturation <= MOST_SATURATION:
+            raise ValueError(
+                f"a saturation of {self.saturation:g} is not between 0 and {MOST_SATURATION:g}"
+            )
 
     @property
     def gain(self) -> tuple[float, float, float]:

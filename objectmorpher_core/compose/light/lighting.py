@@ -41,7 +41,8 @@ class Lit:
     relit: Relit | None = None
     grain: Grain | None = None
     blur: float = 0.0  # px of the photo, standard deviation; before all the others
-    opacity: float = 1.0  # of the whole; after all the others
+    saturation: float = 1.0  # x as far from grey; after all the others
+    opacity: float = 1.0  # of the whole
 
 
 NOTHING = Lit()
@@ -141,7 +142,8 @@ class Lighting:
                 carried = texture or object_texture(item.matte, item.lifted)
                 grain = find_grain(splats, carried, self.noise, item.grain, camera, blur)
         r, g, b = (a * own for a, own in zip(gain, item.finish.gain, strict=True))
-        return Lit((r, g, b), shade, relit, grain, blur, item.finish.opacity)
+        own = item.finish.saturation, item.finish.opacity
+        return Lit((r, g, b), shade, relit, grain, blur, *own)
 
     def _defocus(
         self, item: EditObject, splats: PosedSplats, rest: PosedSplats, horizon: float | None

@@ -117,7 +117,7 @@ def test_sixteen_bits_stay_sixteen_and_are_more_exact():
     assert all(layer.pixels.dtype == np.uint16 for layer in pile)
 
 
-@over("finish", [Finish(opacity=0.4), Finish(exposure=-1.0), Finish(0.7, 0.3, 1.0)])
+@over("finish", [Finish(opacity=0.4), Finish(exposure=-1.0), Finish(0.7, 0.3, 1.0, 0.5)])
 def test_an_object_of_another_finish_is_seen_so_where_it_is_and_in_its_layer(finish):
     """At rest, too: exactly its own pixels change, by the gain and the share that are asked for."""
     scene = shapes.scene("ellipse")
@@ -129,6 +129,8 @@ def test_an_object_of_another_finish_is_seen_so_where_it_is_and_in_its_layer(fin
     plate = document.plate
     assert plate is not None
     own = np.minimum(colour[inside] * finish.gain, 1)
+    grey = own @ [[0.299], [0.587], [0.114]]
+    own = np.clip(grey + finish.saturation * (own - grey), 0, 1)
     wanted = 255 * finish.opacity * own + (1 - finish.opacity) * plate.pixels[inside]
     assert np.abs(pixels[inside] - wanted).max() <= OFF
     far = cv2.dilate((alpha > 0).astype(np.uint8), np.ones((41, 41))) == 0

@@ -12,6 +12,7 @@ from objectmorpher_core.document.settings import (
     LEAST_FEATHER,
     MOST_EXPOSURE,
     MOST_FEATHER,
+    MOST_SATURATION,
     MOST_SHADOW,
     USUAL_DEFOCUS,
     USUAL_GRAIN,
@@ -263,6 +264,8 @@ def _draw_finish(editor: Editor) -> None:
         (Number(t("Exposure"), "%+.2f", 0.01, 0.25, 0.0, -MOST_EXPOSURE, MOST_EXPOSURE),
          "exposure", 1.0),
         (Number(t("Warmth"), "%+.0f", 0.5, 5.0, 0.0, -100.0, 100.0), "warmth", 100.0),
+        (Number(t("Saturation"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100 * MOST_SATURATION),
+         "saturation", 100.0),
     )  # fmt: skip
     for number, name, unit in rows:
         change = number_field(number, unit * getattr(finish, name))
