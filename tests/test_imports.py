@@ -284,3 +284,60 @@ def test_no_two_public_classes_have_the_same_name():
                 places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
     assert len(places) > 500
     assert {name: found for name, found in places.items() if len(found) > 1} == {}
+
+
+def test_what_the_scripts_of_docs_and_packages_import_exists():
+    """No other test runs them as a whole, and none checks their types."""
+    scripts = sources(ROOT / "docs", ROOT / "packaging")
+    assert len(scripts) > 50
+    assert broken({path: set(_missing(path)) for path in scripts}) == []
+
+
+def _missing(path: Path) -> Iterator[str]:
+    """Names that a script takes from the project's modules, and that these do not have."""
+    tree = parsed(path)
+    taken = {
+        (alias.asname or alias.name): f"{node.module}.{alias.name}"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level
+        for alias in node.names
+    }
+    bound = {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    bound |= {
+        n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+    }
+    asked = set(taken.values()) | {
+        f"{taken[node.value.id]}.{node.attr}"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+        if node.value.id in taken.keys() - bound
+    }
+    for name in asked:
+        module, _, member = name.rpartition(".")
+        source = _source(module)
+        if source and not _source(name) and not {member, "__getattr__"} & _names(source):
+            yield name
+
+
+def _source(module: str) -> Path | None:
+    """The file of a module of the project."""
+    root, *rest = module.split(".")
+    folder = {folder.name: folder for folder in (CORE, APP, RESEARCH)}.get(root)
+    if folder is None:
+        return None
+    place = folder.joinpath(*rest)
+    return next((p for p in (place.with_suffix(".py"), place / "__init__.py") if p.is_file()), None)
+
+
+@cache
+def _names(path: Path) -> frozenset[str]:
+    """Every name that a module binds, wherever in it: more than it has, never less."""
+    found = set()
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            found.add(node.id)
+        elif isinstance(node, ast.alias):
+            found.add((node.asname or node.name).split(".")[0])
+    return frozenset(found)

@@ -10,9 +10,8 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Pixels, Selection
 from objectmorpher_core.base.pixels import crop, unit_pixels
-from objectmorpher_core.pipeline import MATTE_MARGIN
 from objectmorpher_core.segment.mask_edit import FULL, is_selected
-from objectmorpher_core.segment.matting.matte import REACH, band_width, build_matte, signed_distance
+from objectmorpher_core.segment.matting.matte import REACH, band_width, cut_out, signed_distance
 
 Method = Callable[[Pixels, Selection], tuple[F32, F32]]  # alpha (H, W), foreground (H, W, 3)
 NARROW = 1.5  # x band: half-width of a usual trimap
@@ -26,8 +25,7 @@ def hard_mask(pixels: Pixels, selection: Selection) -> tuple[F32, F32]:
 def ours(pixels: Pixels, selection: Selection) -> tuple[F32, F32]:
     """What the editor does."""
     height, width = selection.shape
-    margin = int(np.ceil(MATTE_MARGIN * band_width(width, height))) + 8
-    matte = build_matte(pixels, selection, margin)
+    matte = cut_out(pixels, selection)
     box = (0, 0, width, height)
     return crop(matte.alpha, matte.box, box), crop(matte.foreground, matte.box, box)
 

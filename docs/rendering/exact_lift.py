@@ -15,12 +15,14 @@ from objectmorpher_core.base.rotations import quats_along
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import LiftedObject, PhotoTexture, Placement
 from objectmorpher_core.lift.relief import lifter as relief
+from objectmorpher_core.lift.relief.spreading import PACKING
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.texture import TextureLevels, build_levels
 
 RAYS = 5  # by as many in a pixel
 REST = np.eye(4)
 CANDIDATES = 12  # for a Gaussian, before they are thinned
+COLOUR_BLUR = 1.2  # x mean spacing: plain colours, so that neighbours agree
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +84,13 @@ def _spread(count: int, rng: np.random.Generator) -> tuple[F64, F64, float]:
     area = 4 * np.pi * solid.AXES.prod() * growth.mean()
     spacing = float(np.sqrt(area / count))
     order = rng.permutation(len(points))
-    points = points[thin_to_spacing(points, spacing * np.sqrt(relief.PACKING), order)]
+    points = points[thin_to_spacing(points, spacing * np.sqrt(PACKING), order)]
     return points, solid.normals(points), spacing
 
 
 def _colors(points: F64, normals: F64, spacing: float) -> F64:
     """(N, 3): the texture, averaged as the relief averages the photo; the back has it, too."""
-    blur, around = relief.COLOUR_BLUR * spacing, 24
+    blur, around = COLOUR_BLUR * spacing, 24
     rng = np.random.default_rng(0)
     total = np.zeros((len(points), 3))
     for _ in range(around):

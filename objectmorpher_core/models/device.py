@@ -46,10 +46,12 @@ def devices() -> tuple[Device, ...]:
 
 def total_memory() -> int:
     """Bytes of main memory; what is free where nobody can tell."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (ValueError, OSError, AttributeError):
-        return _free_main_memory() or 0
+    if sys.platform != "win32":
+        try:
+            return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        except (ValueError, OSError):
+            pass
+    return _free_main_memory() or 0
 
 
 def free_memory(device: Device) -> int | None:
