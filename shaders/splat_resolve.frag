@@ -72,7 +72,7 @@ void main() {
     seen *= max(1.0 - photos.z * inverse, 0.0);
     float matted = max(1.0 - photos.w * inverse, 0.0), solids = colors.a * inverse;
     float matte = texel.a * matted + solids;
-    if (is_edged) {  // rules.py: closing_turn
+    if (is_edged) {  // rules.py: closing_end
         float turned = clamp((1.0 - matted - solids) / closing_share, 0.0, 1.0);
         matte = mix(matte, 1.0, turned * ramp(texel.a, closed_start, closed_end));
     }

@@ -221,7 +221,7 @@ def _mix_sides(s, start, end, closing):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _matte(alpha, matted, solids, closing):
-    """Return a pixel's matte where that of the photo has this `alpha`, see `Rules.closing_turn`.
+    """Return a pixel's matte where that of the photo has this `alpha`, see `Rules.closing_end`.
 
     `matted`, `solids`: the shares of what shows the photo that keep its matte, and that are whole.
     """

@@ -209,7 +209,7 @@ def weigh_textured(s, rest, base, scale, rules, kind):
             photo = ramp(stretch, rules.streak_end, rules.streak_start)
             matted = ramp(stretch, rules.matte_end, rules.matte_start)
         if kind.is_edged:
-            kept = ramp(turned, rules.closing_turn, 0.0)
+            kept = ramp(turned, rules.closing_end, rules.closing_start)
             matted *= seen * (solidity + (1.0 - solidity) * kept)
         else:
             matted *= ramp(turned, rules.turned_end, rules.turned_start)

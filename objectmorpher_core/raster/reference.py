@@ -100,7 +100,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     facing = solidity * front + (1 - solidity) * brim
     matted = smoothstep(stretch, RULES.matte_end, RULES.matte_start)
     if kind.is_edged:
-        kept = smoothstep(turned, RULES.closing_turn, 0.0)
+        kept = smoothstep(turned, RULES.closing_end, RULES.closing_start)
         matted *= seen * (solidity + (1 - solidity) * kept)
     else:
         matted *= smoothstep(turned, RULES.turned_end, RULES.turned_start)

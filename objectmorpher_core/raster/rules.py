@@ -97,8 +97,10 @@ class Rules(NamedTuple):
     # Where the rim of an edged shape turns towards the camera, a side comes into view behind it,
     # and the soft inner half of the matte's edge would be a translucent line between the two. The
     # brim shows how far the rim has turned: the more of it has, the more the matte is closed, from
-    # closed_start of its alpha on, and wholly from closed_end on.
-    closing_turn: float = 0.03  # of the cosine, from which on a Gaussian of the brim has turned
+    # closed_start of its alpha on, and wholly from closed_end on. Of smaller turns a rounded thing
+    # has no side to show, and one that is moved by a few px keeps its soft edge.
+    closing_start: float = 0.06  # of the cosine, from which on a Gaussian of the brim has turned
+    closing_end: float = 0.12
     closing_share: float = 0.1  # of what shows the photo, that suffices; all the brim would fade
     closed_start: float = 0.15
     closed_end: float = 0.45
