@@ -309,6 +309,7 @@ class _Run:
         )
         if wanted.duplicate is None:
             self.document = runner.placed(self.document, k, script)
+            self.document = runner.finished(self.document, k, script)
         if script.shadow == "auto" and has_left(self.document.objects[k]):
             self.casting.add(k)
 

@@ -10,6 +10,7 @@ uniform float split;      // canvas px, left of which the photo is shown as it w
 uniform sampler2D marks;  // share that shows the object but nothing of the photo
 uniform float opacity;
 
+uniform float saturation;
 uniform vec3 gain;        // of the light at the new place
 uniform sampler2D relit;  // less 1, of the light where the object turned
 uniform vec4 relit_box;   // x0, y0, x1, y1 canvas px
@@ -42,6 +43,7 @@ void main() {
 #ifdef HAS_GRAIN
     color = grained(color, texture(amounts, (xy - amounts_box.xy) / (amounts_box.zw - amounts_box.xy)));
 #endif
+    color = saturated(color, saturation);
 #ifdef HAS_MARKS
 #ifdef DETAIL  // of a picture drawn by the GPU: share that shows the photo, second channel
     float share = color.a - texture(marks, at).g;

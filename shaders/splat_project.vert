@@ -50,6 +50,8 @@ uniform float matte_start;
 uniform float matte_end;
 uniform float turned_start;
 uniform float turned_end;
+uniform float closing_start;
+uniform float closing_end;
 uniform float streak_start;
 uniform float streak_end;
 uniform float sharp;
@@ -165,7 +167,10 @@ void main() {
         front = clamp((cosine - facing_ramp * (1.0 - seen)) / facing_ramp + 1.0, 0.0, 1.0);
     weight *= solidity * front + (1.0 - solidity) * brim;
     float matted = ramp(stretch, matte_end, matte_start);
-    matted *= is_edged ? seen : ramp(turn, turned_end, turned_start);
+    if (is_edged)
+        matted *= seen * (solidity + (1.0 - solidity) * ramp(turn, closing_end, closing_start));
+    else
+        matted *= ramp(turn, turned_end, turned_start);
     if (is_aside) {
         matted = seen = 0.0;
     } else if (has_colors) {

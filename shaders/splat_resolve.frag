@@ -18,6 +18,9 @@ uniform vec3 unmoved;            // crop px = x * gl_FragCoord + yz, of what has
 uniform vec4 photo_box;          // crop px, the photo: elsewhere it is made up
 uniform float surface_level;     // rules.Rules
 uniform float edge_width;
+uniform float closing_share;
+uniform float closed_start;
+uniform float closed_end;
 uniform float same_point;
 uniform float apart;
 uniform float visible;
@@ -67,7 +70,12 @@ void main() {
     if (is_own) texel = sample_photo(at, 1.0 + photos.y * inverse);
     float seen = is_own && all(greaterThan(at, photo_box.xy)) && all(lessThan(at, photo_box.zw)) ? 1.0 : 0.0;
     seen *= max(1.0 - photos.z * inverse, 0.0);
-    float matte = texel.a * max(1.0 - photos.w * inverse, 0.0) + colors.a * inverse;
+    float matted = max(1.0 - photos.w * inverse, 0.0), solids = colors.a * inverse;
+    float matte = texel.a * matted + solids;
+    if (is_edged) {  // rules.py: closing_end
+        float turned = clamp((1.0 - matted - solids) / closing_share, 0.0, 1.0);
+        matte = mix(matte, 1.0, turned * ramp(texel.a, closed_start, closed_end));
+    }
     matte = is_photo ? matte : 0.0;
     if (is_aside) {  // whole, and the photo counts as far as the matte has something of it
         vec2 there = sides.zw / sides.y;

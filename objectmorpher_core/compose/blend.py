@@ -45,7 +45,7 @@ class Rows:
     from_inpainter: F32
     moved: F32  # px, see `displacement`
     is_covered: Mask  # by an object, now or before
-    touched: F32 | None = None  # in [0, 1], what is seen of shadows and repairs; None: of none
+    touched: F32 | None = None  # in [0, 1], what changes in place: shadows, repairs, colours
     is_object: Mask | None = None  # what objects alone cover, where more is covered; None: all is
 
     @property

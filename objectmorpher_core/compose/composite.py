@@ -19,7 +19,7 @@ from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
 from ..deform.puppet import Puppet, puppet_of
 from ..document.model import Document, EditObject, Matte, Placement, Plate
-from ..document.settings import Refined
+from ..document.settings import AS_IN_THE_PHOTO, Refined
 from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
@@ -38,7 +38,7 @@ from .blend import (
 )
 from .blend import STILL as STILL
 from .light.defocus import blurred, reach_of
-from .light.harmonize import lit
+from .light.harmonize import lit, saturated
 from .light.lighting import NOTHING, Lighting, Lit
 from .light.lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
@@ -245,7 +245,13 @@ class _Drawing:
             color = look.relit.lit(color, picture.alpha, self.box[0], top)
         if look.grain is not None:
             color = look.grain.grained(color, picture.alpha, self.box[0], top)
-        return replace(picture, color=color)
+        color = saturated(color, picture.alpha, look.saturation)
+        if (share := np.float32(look.opacity)) == 1:
+            return replace(picture, color=color)
+        return replace(
+            picture, color=share * color, alpha=share * picture.alpha,
+            from_photo=share * picture.from_photo,
+        )  # fmt: skip
 
     def _focussed(self, k: int, top: int, bottom: int, blur: float) -> Picture3D:
         """The rows of an object's picture, as much out of focus as it is to be."""
@@ -341,6 +347,10 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
     moved = displacement(around, rest)[inner]
     picture = _part(around, inner.start, inner.stop)
     through = 1 - picture.alpha
+    touched = None if rows.touched is None else rows.touched * through
+    if thing.item.finish != AS_IN_THE_PHOTO:  # also where it has not moved
+        own = np.maximum(picture.alpha, rest[inner])
+        touched = own if touched is None else np.maximum(touched, own)
     return replace(
         rows,
         colour=picture.color + through[..., None] * rows.colour,
@@ -349,7 +359,7 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
         from_inpainter=through * rows.from_inpainter,
         moved=np.maximum(rows.moved, moved),
         is_covered=rows.is_covered | (rest[inner] > 0) | (picture.alpha > 0),
-        touched=None if rows.touched is None else rows.touched * through,
+        touched=touched,
     )
 
 

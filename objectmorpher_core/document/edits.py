@@ -34,6 +34,7 @@ from .settings import (
     USUAL_GRAIN,
     USUAL_HARMONY,
     USUAL_RELIGHT,
+    Finish,
     Hint,
     Refined,
     Shadow,
@@ -175,12 +176,9 @@ def refit(
 
 
 def set_lifted(
-    document: Document,
-    k: int,
-    matte: Matte,
-    lifted: LiftedObject,
+    document: Document, k: int, matte: Matte, lifted: LiftedObject,
     shape: LiftSettings | None = None,
-) -> Document:
+) -> Document:  # fmt: skip
     """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
     item = decontaminated(document.photo, document.objects[k].with_lifted(matte, lifted, shape))
     return document.with_object(k, item).with_backend("lift", lifted.backend)
@@ -405,10 +403,7 @@ def rename(document: Document, k: int, name: str) -> Document:
 
 
 def duplicate(document: Document, k: int) -> Document:
-    """A copy of object `k` after all others, where the object is; its arrays are shared.
-
-    The plate stays: there is nothing new to fill in.
-    """
+    """A copy of object `k` after all others, where the object is; arrays and plate stay."""
     item = document.objects[k]
     if item.lifted is None:
         raise EditError("lift the object before making a copy of it")
@@ -426,47 +421,51 @@ def _free_name(name: str, taken: set[str]) -> str:
 
 def set_shadow(document: Document, k: int, shadow: Shadow) -> Document:
     """The shadow that object `k` casts once it has moved. Raises EditError for nonsense."""
-    try:
-        shadow.check()
-    except ValueError as error:
-        raise EditError(str(error)) from error
-    return document.with_object(k, replace(document.objects[k], shadow=shadow))
+    return _with_settings(document, k, "shadow", shadow)
 
 
 def set_harmony(document: Document, k: int, harmony: float) -> Document:
     """Set how far object `k` takes on the light of its new place, in [0, 1]."""
-    if not 0 <= harmony <= 1:
-        raise EditError(f"a harmony of {harmony:g} is not between 0 and 1")
-    return document.with_object(k, replace(document.objects[k], harmony=float(harmony)))
+    return _with_share(document, k, "harmony", harmony)
 
 
 def set_relight(document: Document, k: int, relight: float) -> Document:
     """Set how far the light on object `k` stays in place while the object turns, in [0, 1]."""
-    if not 0 <= relight <= 1:
-        raise EditError(f"a relighting of {relight:g} is not between 0 and 1")
-    return document.with_object(k, replace(document.objects[k], relight=float(relight)))
+    return _with_share(document, k, "relight", relight)
 
 
 def set_grain(document: Document, k: int, grain: float) -> Document:
     """Set how much of the lost grain object `k` is given, in [0, 1]."""
-    if not 0 <= grain <= 1:
-        raise EditError(f"a grain of {grain:g} is not between 0 and 1")
-    return document.with_object(k, replace(document.objects[k], grain=float(grain)))
+    return _with_share(document, k, "grain", grain)
 
 
 def set_defocus(document: Document, k: int, defocus: float) -> Document:
     """Set how far object `k` is blurred like the photo at its new depth, in [0, 1]."""
-    if not 0 <= defocus <= 1:
-        raise EditError(f"a defocus of {defocus:g} is not between 0 and 1")
-    return document.with_object(k, replace(document.objects[k], defocus=float(defocus)))
+    return _with_share(document, k, "defocus", defocus)
+
+
+def _with_share(document: Document, k: int, name: str, share: float) -> Document:
+    if not 0 <= share <= 1:
+        what = "relighting" if name == "relight" else name
+        raise EditError(f"a {what} of {share:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], **{name: float(share)}))
+
+
+def set_finish(document: Document, k: int, finish: Finish) -> Document:
+    """Set the opacity and the colours of object `k`. Raises EditError for nonsense."""
+    return _with_settings(document, k, "finish", finish)
+
+
+def _with_settings(document: Document, k: int, name: str, settings: Shadow | Finish) -> Document:
+    try:
+        settings.check()
+    except ValueError as error:
+        raise EditError(str(error)) from error
+    return document.with_object(k, replace(document.objects[k], **{name: settings}))
 
 
 def harmonised(document: Document, k: int, is_harmonised: bool = True) -> Document:
-    """Object `k` in the light of its new place and of how it is turned, as grainy as the photo,
-    and as blurred as that is there.
-
-    Or as it was in the photo.
-    """
+    """Object `k` in the light, grain and focus of its new place, or as it was in the photo."""
     share = 1.0 if is_harmonised else 0.0
     document = set_harmony(document, k, share * USUAL_HARMONY)
     document = set_relight(document, k, share * USUAL_RELIGHT)

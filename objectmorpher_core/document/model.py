@@ -21,7 +21,7 @@ from ..pictures.image import Picture
 from .gaussians import Gaussians
 from .pose import UNHELD, Base, Handle, Pose
 from .rig import Rig
-from .settings import Hint, Refined, Shadow
+from .settings import AS_IN_THE_PHOTO, Finish, Hint, Refined, Shadow
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,6 +387,7 @@ class EditObject:
     # (h, w, 3) the matte's foreground before that; None: as it is
     contaminated: F32 | None = None
     keys: tuple[KeyPose, ...] = ()  # key poses of an animation, as many as the document has
+    finish: Finish = AS_IN_THE_PHOTO
 
     @property
     def found_matte(self) -> Matte | None:
@@ -404,10 +405,11 @@ class EditObject:
 
     @property
     def is_moved(self) -> bool:
-        """Whether the object is anywhere else than in the photo."""
+        """Whether the object is anywhere else than in the photo, or looks otherwise."""
         return self.lifted is not None and (
             self.pose is not None or not self.placement.is_identity or not self.is_visible
-        )
+            or self.finish != AS_IN_THE_PHOTO
+        )  # fmt: skip
 
     @property
     def selection(self) -> Selection | None:
@@ -500,7 +502,7 @@ class Plate:
 # Of an object, what its picture depends on; what else changes leaves a refinement as it is.
 SHOWN = (
     "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
-    "harmony", "relight", "grain", "defocus", "stays_in_front",
+    "harmony", "relight", "grain", "defocus", "stays_in_front", "finish",
 )  # fmt: skip
 
 

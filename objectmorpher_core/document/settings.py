@@ -69,6 +69,50 @@ class Shadow:
             raise ValueError("a shadow's colour is not between 0 and 1")
 
 
+# How an object looks otherwise than in the photo, as of a layer of a paint program.
+
+MOST_EXPOSURE = 3.0  # stops, up or down
+MOST_SATURATION = 2.0
+GAMMA = 2.2  # of encoded values: a stop of linear light is a factor of them
+WARMTH = 0.5  # stops, by which red rises and blue falls at a warmth of 1
+
+
+@dataclass(frozen=True)
+class Finish:
+    """The opacity and the colours of an object, as the artist wants them."""
+
+    opacity: float = 1.0  # in [0, 1]
+    exposure: float = 0.0  # stops of light
+    warmth: float = 0.0  # in [-1, 1], from blue to amber
+    saturation: float = 1.0  # x as far from grey, in [0, 2]
+
+    def check(self) -> None:
+        """Raises ValueError where a number makes no sense."""
+        if not 0 <= self.opacity <= 1:
+            raise ValueError(f"an opacity of {self.opacity:g} is not between 0 and 1")
+        if not -MOST_EXPOSURE <= self.exposure <= MOST_EXPOSURE:
+            raise ValueError(
+                f"an exposure of {self.exposure:g} stops is not"
+                f" {-MOST_EXPOSURE:g} to {MOST_EXPOSURE:g}"
+            )
+        if not -1 <= self.warmth <= 1:
+            raise ValueError(f"a warmth of {self.warmth:g} is not between -1 and 1")
+        if not 0 <= self.saturation <= MOST_SATURATION:
+            raise ValueError(
+                f"a saturation of {self.saturation:g} is not between 0 and {MOST_SATURATION:g}"
+            )
+
+    @property
+    def gain(self) -> tuple[float, float, float]:
+        """Return the factors of encoded red, green and blue."""
+        warmer = WARMTH * self.warmth
+        r, g, b = (2.0 ** ((self.exposure + stops) / GAMMA) for stops in (warmer, 0.0, -warmer))
+        return r, g, b
+
+
+AS_IN_THE_PHOTO = Finish()
+
+
 # What a learned refiner has made of an edit, as the document keeps it.
 
 

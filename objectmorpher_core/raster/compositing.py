@@ -10,7 +10,7 @@ from ..base.kernel_files import numba
 from ..base.threads import EXACT, FAST
 from . import tile_memory as m
 from .intrinsics import sixteen_texels
-from .rules import HALF, INFINITE, ONE, TWO, ZERO, coverage, ramp
+from .rules import HALF, INFINITE, ONE, THREE, TWO, ZERO, coverage, ramp
 from .sampling import C15, C25, add_halved, sample
 
 # The photo at the pixels of a tile: step 5 of `reference`, compiled.
@@ -107,6 +107,10 @@ def composite_layer(
     Returns the first row, and the last + 1, in which a further layer may be seen.
     """
     edged = ONE if kind.is_edged else ZERO
+    closing = (
+        edged / np.float32(rules.closing_share), np.float32(rules.closed_start),
+        ONE / np.float32(rules.closed_end - rules.closed_start),
+    )  # fmt: skip
     for strip in range(m.STRIPS):
         start, end = m.strip_pixels(strip, first, last)
         _settle(s, start, end, edged)
@@ -118,7 +122,7 @@ def composite_layer(
             s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top
         )
         for strip in range(m.STRIPS):
-            _mix_sides(s, *m.strip_pixels(strip, first, last))
+            _mix_sides(s, *m.strip_pixels(strip, first, last), closing)
     visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
     for strip in range(m.STRIPS):
         start, end = m.strip_pixels(strip, first, last)
@@ -127,9 +131,9 @@ def composite_layer(
             bodied = m.BODY_CLEAR if kind.is_edged else m.BODIED
             _cover(s, start, end, bodied, m.BGX, m.BGY, m.BODY_CLEAR, rules)
         if layer == 0:
-            _put_first(s, start, end, visible, opaque)
+            _put_first(s, start, end, visible, opaque, closing)
         else:
-            _put_behind(s, start, end, rules)
+            _put_behind(s, start, end, rules, closing)
     least = np.float32(rules.least_front)
     begin, end = last, first
     for y in range(first, last):
@@ -192,7 +196,7 @@ def _set_aside(s, start, end):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _mix_sides(s, start, end):
+def _mix_sides(s, start, end, closing):
     """Mixes what both have shown; where the photo is shown at all, it says where a pixel looks.
 
     The photo counts as far as the matte has something of it, invented pictures are whole.
@@ -200,7 +204,7 @@ def _mix_sides(s, start, end):
     for k in range(start, end):
         own, is_there = s[m.P_SHOWN + k], s[m.IS_PHOTO + k]
         side = s[m.SIDE + k] * is_there
-        matte = s[m.P_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]
+        matte = _matte(s[m.P_A + k], s[m.MATTES + k], s[m.SOLIDS + k], closing)
         share = min(side / max(matte, TINY), ONE)
         share = share if own > ZERO else is_there
         rest = own * (ONE - share)
@@ -216,6 +220,18 @@ def _mix_sides(s, start, end):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _matte(alpha, matted, solids, closing):
+    """Return a pixel's matte where that of the photo has this `alpha`, see `Rules.closing_end`.
+
+    `matted`, `solids`: the shares of what shows the photo that keep its matte, and that are whole.
+    """
+    matte = alpha * matted + solids
+    turned = min(max(ONE - matted - solids, ZERO) * closing[0], ONE)
+    t = min(max((alpha - closing[1]) * closing[2], ZERO), ONE)
+    return matte + (ONE - matte) * turned * t * t * (THREE - TWO * t)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _cover(s, start, end, total, across, down, clear, rules):
     """1 - coverage, see `rules.coverage`, into the row `clear`."""
     for k in range(start, end):
@@ -224,12 +240,12 @@ def _cover(s, start, end, total, across, down, clear, rules):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _put_first(s, start, end, visible, opaque):
+def _put_first(s, start, end, visible, opaque, closing):
     """The first layer: nothing is in front of it."""
     for k in range(start, end):
         total, body, is_photo = s[m.TOTAL + k], s[m.BODIED + k], s[m.IS_PHOTO + k]
         photo = max(total - body, ZERO) * is_photo
-        matte = (s[m.T_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]) * is_photo
+        matte = _matte(s[m.T_A + k], s[m.MATTES + k], s[m.SOLIDS + k], closing) * is_photo
         whole, solid = ONE - s[m.CLEAR + k], ONE - s[m.BODY_CLEAR + k]
         alpha = matte * whole + (ONE - matte) * solid
         alpha = alpha if total > ZERO else ZERO
@@ -253,7 +269,7 @@ def _put_first(s, start, end, visible, opaque):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _put_behind(s, start, end, rules):
+def _put_behind(s, start, end, rules, closing):
     """A later layer. Where it does not show, 0 is added: stores on a condition are slow."""
     near, far = np.float32(rules.same_point), np.float32(rules.apart)
     visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
@@ -261,7 +277,7 @@ def _put_behind(s, start, end, rules):
         total, body, is_photo = s[m.TOTAL + k], s[m.BODIED + k], s[m.IS_PHOTO + k]
         shows = ONE if total * s[m.OPEN + k] > ZERO else ZERO
         photo, total = max(total - body, ZERO) * is_photo, max(total, TINY)
-        matte = (s[m.T_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]) * is_photo
+        matte = _matte(s[m.T_A + k], s[m.MATTES + k], s[m.SOLIDS + k], closing) * is_photo
         whole, solid = ONE - s[m.CLEAR + k], ONE - s[m.BODY_CLEAR + k]
         alpha = shows * (matte * whole + (ONE - matte) * solid)
         x, y = s[m.SHX + k], s[m.SHY + k]

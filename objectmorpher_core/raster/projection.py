@@ -208,7 +208,11 @@ def weigh_textured(s, rest, base, scale, rules, kind):
             stretch *= volume ** (1.0 / 3.0)
             photo = ramp(stretch, rules.streak_end, rules.streak_start)
             matted = ramp(stretch, rules.matte_end, rules.matte_start)
-        matted *= seen if kind.is_edged else ramp(turned, rules.turned_end, rules.turned_start)
+        if kind.is_edged:
+            kept = ramp(turned, rules.closing_end, rules.closing_start)
+            matted *= seen * (solidity + (1.0 - solidity) * kept)
+        else:
+            matted *= ramp(turned, rules.turned_end, rules.turned_start)
         if s[o + p.ASIDE * LANES] > 0.0:
             matted = seen = 0.0
         elif kind.has_colors:

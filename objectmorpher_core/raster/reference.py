@@ -21,7 +21,8 @@
 6. A layer's alpha is the matte's where the photo is carried along and the rim has not turned
    towards the camera; otherwise it ends where the kernel sum falls below a level, antialiased
    by the sum's own gradient (a surface), or is 1 - prod(1 - alpha) (other assets). Of an edged
-   surface all that the photo has shown keeps the matte, and the rest covers what lies beneath.
+   surface all that the photo has shown keeps the matte, and the rest covers what lies beneath;
+   where the rim has turned towards the camera, the inner half of the matte's edge is closed.
 7. Layers are composited front to back, premultiplied. As far as two successive layers show the
    same point of the photo they are one surface that was split, and their coverage adds up under
    one matte.
@@ -98,7 +99,11 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     brim = smoothstep(np.abs(cosine), *fades)
     facing = solidity * front + (1 - solidity) * brim
     matted = smoothstep(stretch, RULES.matte_end, RULES.matte_start)
-    matted *= seen if kind.is_edged else smoothstep(turned, RULES.turned_end, RULES.turned_start)
+    if kind.is_edged:
+        kept = smoothstep(turned, RULES.closing_end, RULES.closing_start)
+        matted *= seen * (solidity + (1 - solidity) * kept)
+    else:
+        matted *= smoothstep(turned, RULES.turned_end, RULES.turned_start)
     matted *= ~aside
     photo = np.where(aside, carried, seen * carried) if kind.has_colors else carried
     body = (1 - photo) * solidity
@@ -185,7 +190,7 @@ def render(
     there = [(i, s) for i, s in enumerate(samples) if s is not None]
     if not splats.is_layered:
         return _composite_one_by_one(p, there, camera)
-    out = ReferenceComposite(texture, camera, photo_camera, splats.rest.splatting.is_surface)
+    out = ReferenceComposite(texture, camera, photo_camera, splats.rest.splatting)
     fronts: list[_Front] = []
     for layer in range(LAYERS):
         shares = {i: _remaining(p, i, s, fronts, splats) for i, s in there}

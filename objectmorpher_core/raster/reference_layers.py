@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.arrays import F32, F64
 from ..base.camera import Camera
-from .rules import RULES
+from .rules import RULES, Splatting
 from .texture import TextureLevels, sample_texture
 
 MEDIAN = 0.5  # of alpha: where the object is
@@ -112,10 +112,10 @@ class ReferenceComposite:
     """Layers over one another, front to back (steps 5 to 7)."""
 
     def __init__(
-        self, texture: TextureLevels, camera: Camera, photo_camera: Camera, is_surface: bool
+        self, texture: TextureLevels, camera: Camera, photo_camera: Camera, kind: Splatting
     ) -> None:
         self.texture, self.camera, self.photo_camera = texture, camera, photo_camera
-        self.is_surface = is_surface
+        self.kind = kind
         shape = (camera.height, camera.width)
         self.color = np.zeros((*shape, 3))
         self.alpha = np.zeros(shape)
@@ -145,13 +145,18 @@ class ReferenceComposite:
         sample[~is_own, 3] = 0.0
         invented = sample_texture(self.texture, self._looks(at, aside, is_side), lod)[:, :3]
         matte = (sample[:, 3] * layer.matted[at] + layer.unmatted[at]) / weight
+        if self.kind.is_edged:
+            turned = 1 - (layer.matted[at] + layer.unmatted[at]) / weight
+            closed = np.clip(turned / RULES.closing_share, 0, 1)
+            closed *= smoothstep(sample[:, 3], RULES.closed_start, RULES.closed_end)
+            matte += (1 - matte) * closed
         matte = np.where(is_photo, matte, 0.0)
         # The photo counts as far as the matte has something of it, invented pictures are whole.
         share = np.where(is_own, np.minimum(side * is_side / np.maximum(matte, 1e-30), 1), is_side)
         sample[:, :3] += share[:, None] * (invented - sample[:, :3])
         shift = np.where(is_own[:, None], shift, aside)
         visible = np.minimum((1 - share) / np.maximum(1 - side, 1e-6), 1) * layer.seen[at]
-        if self.is_surface:
+        if self.kind.is_surface:
             whole = _coverage(total, np.linalg.norm(layer.slope[at], axis=1))
             slope = np.linalg.norm(layer.ended_slope[at], axis=1)
             solid = _coverage(layer.ended[at], slope)

@@ -94,6 +94,17 @@ class Rules(NamedTuple):
     turned_start: float = 0.08  # of the cosine, more than at rest
     turned_end: float = 0.25
 
+    # Where the rim of an edged shape turns towards the camera, a side comes into view behind it,
+    # and the soft inner half of the matte's edge would be a translucent line between the two. The
+    # brim shows how far the rim has turned: the more of it has, the more the matte is closed, from
+    # closed_start of its alpha on, and wholly from closed_end on. Of smaller turns a rounded thing
+    # has no side to show, and one that is moved by a few px keeps its soft edge.
+    closing_start: float = 0.06  # of the cosine, from which on a Gaussian of the brim has turned
+    closing_end: float = 0.12
+    closing_share: float = 0.1  # of what shows the photo, that suffices; all the brim would fade
+    closed_start: float = 0.15
+    closed_end: float = 0.45
+
     # Where an invented picture shows the surface, too, it takes the photo's place from this ratio
     # of the cosines on: of the normal with the way to the photo's camera, to that now.
     look_aside: float = 0.4  # = streak_start: nothing of the photo has faded before

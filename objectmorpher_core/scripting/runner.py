@@ -38,7 +38,7 @@ from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
 from .report import Stopwatch
-from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
+from .script import ALONE, OF_A_FINISH, EditScript, FurtherObject, Others, ScriptError
 
 # What a script says about an object that is lifted: handles, pose, place, light, copies, order.
 
@@ -159,6 +159,7 @@ def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
     )
     document = edits.set_placement(document, k, place)
     document = edits.set_visible(document, k, True)
+    document = finished(document, k, script, said)
     if script.shadow == "none":
         document = edits.set_shadow(document, k, Shadow())
     return document
@@ -220,6 +221,14 @@ def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
                     f" {trust.invented:.0%} of what is seen of it now"
                 )
     return tuple(found)
+
+
+def finished(
+    document: Document, k: int, script: EditScript, said: frozenset[str] = OF_A_FINISH
+) -> Document:
+    """Object `k` as opaque and coloured as the script has `said`."""
+    changes = {name: getattr(script, name) for name in OF_A_FINISH & said}
+    return edits.set_finish(document, k, replace(document.objects[k].finish, **changes))
 
 
 def _placement(script: EditScript) -> Placement:

@@ -15,6 +15,7 @@ from typing import Any
 from ..base.files import read_input
 from ..base.quoting import count_range, meant, shown
 from ..document.model import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
+from ..document.settings import MOST_EXPOSURE, MOST_SATURATION
 
 XY = tuple[float, float]
 MOST_NUMBER = 1e9  # px, degrees, diameters
@@ -68,6 +69,10 @@ class EditScript:
     trust: float = 1.0  # in the shape network, of [0, 1]
     no_depth: bool = False  # not as a depth network sees it, where one is installed
     hidden: str | None = None  # file
+    opacity: float = 1.0  # in [0, 1]
+    exposure: float = 0.0  # stops
+    warmth: float = 0.0  # in [-1, 1], from blue to amber
+    saturation: float = 1.0  # x as far from grey
     decontaminate: float = 0.0  # in [0, 1], of the background's colour in its edge
     front: tuple[XY, ...] = ()  # px, on things that stay in front of what is edited
     front_mask: str | None = None  # file: another one
@@ -387,6 +392,9 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
     "shape": _one_of(*KINDS), "trust": _between(0, 1), "decontaminate": _between(0, 1),
+    "opacity": _between(0, 1), "warmth": _between(-1, 1),
+    "exposure": _between(-MOST_EXPOSURE, MOST_EXPOSURE),
+    "saturation": _between(0, MOST_SATURATION),
     "no_depth": _flag, "hidden": _text,
     "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
     "pin": _points, "handle": _handles, "key": _keys,
@@ -403,4 +411,5 @@ OF_THE_PHOTO = {"fov", "inpaint", "refine_strength", "front", "front_mask", "see
 CHOOSING = {"click", "not_click", "box", "subject", "mask", "segment"}
 OF_A_KEY = {"pin", "handle", "move", "turn", "scale"}
 MOST_KEYS = 11  # beside the pose of the edit itself
-OF_A_COPY = {"pin", "handle", "move", "turn", "scale", "shadow", "refine"}
+OF_A_FINISH = frozenset({"opacity", "exposure", "warmth", "saturation"})
+OF_A_COPY = {"pin", "handle", "move", "turn", "scale", "shadow", "refine"} | OF_A_FINISH

@@ -319,6 +319,7 @@ def _check_joining(document: Document) -> None:
         raise ValueError(f"the blend is {document.feather:g} times as wide as usual")
     for item in document.objects:
         item.shadow.check()
+        item.finish.check()
         shares = {
             "harmony": item.harmony, "relighting": item.relight,
             "grain": item.grain, "defocus": item.defocus,

@@ -22,9 +22,11 @@ from objectmorpher_core.document.settings import (
     USUAL_GRAIN,
     USUAL_HARMONY,
     USUAL_RELIGHT,
+    Finish,
     Shadow,
 )
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
+from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import press, stroke
 from tests.shadowed import inside, photo_of, thrown
 from tests.shapes import png
@@ -295,3 +297,29 @@ def test_the_canvas_shows_the_light_that_stays(editor: Editor, ball: Document) -
     assert again is relit  # made once
     assert np.array_equal(plain.pixels[..., 3], relit.pixels[..., 3])
     assert np.abs(plain.pixels.astype(int) - relit.pixels).max() > 4
+
+
+def test_another_finish_shows_on_the_canvas_where_nothing_moved_and_is_undone(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    finish = Finish(opacity=0.5, exposure=-1.0)
+    editor.composing.preview_finish(finish)
+    editor.commit("Look of object")
+    changed = editor.document
+    assert changed is not None and changed.objects[0].finish == finish
+    assert decode_session(encode_session(changed)).objects[0].finish == finish
+    editor.cache.frame_time = np.inf  # one frame, exact
+    plain = build_frame(edits.set_placement(ball, 0, Placement(move=(0.4, 0))), editor.view,
+        editor.cache).layers[0]  # fmt: skip
+    frame = build_frame(changed, editor.view, editor.cache)
+    editor.cache.frame_time = FRAME
+    shown = frame.layers[0]
+    assert shown.pixels[..., 3].max() in (127, 128) and plain.pixels[..., 3].max() == 255
+    brightness = shown.pixels[..., :3].sum() / plain.pixels[..., :3].sum()
+    assert abs(brightness - 0.5 * finish.gain[1]) < 0.02
+    assert frame.blend is not None and frame.blend.max() == 1
+    run(editor, "undo")
+    assert editor.document is ball
+    editor.composing.preview_finish(Finish(exposure=9.0))  # nonsense is said, and nothing changes
+    assert editor.document is ball and editor.message is not None

@@ -14,9 +14,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from ball import CENTRE, open_file, wait_for_jobs, wait_until
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.opening import THUMB, read_thumbnail
 from objectmorpher.editor.recovery import Left
 from objectmorpher.editor.settings import Backends
 from objectmorpher.editor.view import ToolName
@@ -24,7 +26,8 @@ from objectmorpher.system.freed_memory import set_aside
 from objectmorpher.system.texts import sentence
 from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.document.model import Document
-from objectmorpher_core.pictures.image import read_picture
+from objectmorpher_core.pictures.image import Picture, at_most, encode_picture, read_picture
+from objectmorpher_core.session.file import save_session
 
 SHARE = 0.1  # of what reading a large photo takes: what a look at what has come in may, meanwhile
 TRIES = 3
@@ -254,3 +257,24 @@ def test_what_was_left_is_offered_where_no_start_screen_shows_it(
     editor.start(ball)
     assert editor.message is None  # said once
     editor.recovery.left = ()
+
+
+def test_a_thumbnail_is_the_upright_photo_of_a_file_or_a_session(tmp_path: Path, ball: Document):
+    """Of what is damaged, or no picture, there is none, and nothing is said."""
+    pixels = ball.photo.pixels
+    small = at_most(pixels, THUMB).astype(int)
+    turned = Image.Exif()
+    turned[0x0112] = 6  # a quarter to the right shows it upright
+    Image.fromarray(np.rot90(pixels).copy()).save(tmp_path / "turned.jpg", exif=turned)
+    (tmp_path / "deep.png").write_bytes(encode_picture(Picture(pixels.astype("u2") * 257), "png"))
+    save_session(ball, tmp_path / "ball.omorph")
+    for name, least in (("turned.jpg", 8.0), ("deep.png", 0.01), ("ball.omorph", 0.01)):
+        found = read_thumbnail(tmp_path / name)
+        assert found is not None and found.shape == small.shape, name
+        assert np.abs(found - small).mean() <= least, name
+    whole = (tmp_path / "ball.omorph").read_bytes()
+    wrong = {"cut.omorph": whole[:200], "text.png": b"no", "cut.jpg": b"\xff\xd8\xff"}
+    for name, data in wrong.items():
+        (tmp_path / name).write_bytes(data)
+        assert read_thumbnail(tmp_path / name) is None, name
+    assert read_thumbnail(tmp_path / "gone.png") is None

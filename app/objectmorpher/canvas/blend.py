@@ -16,6 +16,7 @@ import numpy as np
 from objectmorpher_core.base.arrays import F32, F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.settings import AS_IN_THE_PHOTO
 
 from ..editor.view import ViewState
 from .layer import PosedObject
@@ -52,7 +53,11 @@ def build_blend(
         has_left = leaves_a_hole(document.objects, own.k)
         reach = REACH * splats.rest.spacing_px * max(item.placement.scale, 1.0)
         reach += reach_of(lit.blur)
-        apart = _distance(splats, world, document.photo.camera, view, has_left)
+        still = max(composite.STILL, TOLERANCE / view.zoom)
+        if item.finish != AS_IN_THE_PHOTO:
+            still = -1.0  # also what has not moved
+        mark = (still, has_left)
+        apart = _distance(splats, world, document.photo.camera, view, mark)
         distance = np.minimum(distance, apart - reach)
     margin = document.feather * hole_margin(*document.photo.size)
     ramp = (1 - composite.FEATHER_START) * margin
@@ -61,11 +66,16 @@ def build_blend(
 
 
 def _distance(
-    splats: PosedSplats, world: F64, camera: Camera, view: ViewState, has_left: bool
+    splats: PosedSplats,
+    world: F64,
+    camera: Camera,
+    view: ViewState,
+    mark: tuple[float, bool],
 ) -> F32:
-    """(h, w) photo px from each cell to what moved, on the canvas or a little beside it."""
-    from objectmorpher_core.compose import composite
+    """(h, w) photo px from each cell to what moved, on the canvas or a little beside it.
 
+    `mark`: the photo px from which on a Gaussian has moved, and whether it has left a hole.
+    """
     from .moved_cells import mark_moved
 
     height, width = -(-view.height // CELL), -(-view.width // CELL)
@@ -75,7 +85,7 @@ def _distance(
     corner = (view.left - PAD / scale, view.top - PAD / scale)
     mark_moved(
         free, splats.rest.lifted.texture.u0, world, lens, corner, scale,
-        max(composite.STILL, TOLERANCE / view.zoom), has_left,
+        *mark,
     )  # fmt: skip
     if free.all():
         return np.full((height, width), FAR, np.float32)

@@ -209,7 +209,7 @@ def _blend(
 ) -> F32:
     """Where the canvas shows the edit, remembered."""
     looks = [look for _, look in moved]
-    key = (*view.place, *(id(look.shade) for look in looks), *(look.blur for look in looks))
+    key = (*view.place, *((id(look.shade), look.blur) for look in looks))
     if cache.blended is None or cache.blended[0] is not document or cache.blended[1] != key:
         is_edited = any(o.is_moved for o in document.objects)
         plate = cache.derived.plate(document) if is_edited else None

@@ -116,7 +116,7 @@ NEUTRAL = (1.0, 1.0, 1.0)
 
 def in_light(shown: CanvasLayer, look: Lit, place: tuple[float, ...]) -> CanvasLayer:
     """Light an object in the order of the export; `place` is the `View.place` of the picture."""
-    from objectmorpher_core.compose.light.harmonize import lit_rgba
+    from objectmorpher_core.compose.light.harmonize import lit_rgba, saturated
 
     left, top, zoom = place[:3]
     if look.blur > 0 and shown.invented is None:  # where what is the photo's is marked, it is exact
@@ -128,6 +128,10 @@ def in_light(shown: CanvasLayer, look: Lit, place: tuple[float, ...]) -> CanvasL
         rgba = look.relit.lit_rgba(rgba, *corner)
     if look.grain is not None:  # last: it is as strong as the photo's at the brightness shown
         rgba, gain = look.grain.grained_rgba(lit_rgba(rgba, gain), *corner), NEUTRAL
+    if look.opacity < 1 or look.saturation != 1:
+        whole = lit_rgba(rgba, gain).astype(np.float32)
+        whole[..., :3] = saturated(whole[..., :3], whole[..., 3], look.saturation)
+        rgba, gain = (whole * np.float32(look.opacity) + 0.5).astype(np.uint8), NEUTRAL
     return replace(shown, rgba=rgba, gain=gain)
 
 

@@ -254,7 +254,8 @@ def _lit(work: _Work, look: Lit) -> CanvasLayer:
     shown = work.shown
     if work.request.part.is_painted:
         return shown
-    if look.relit is None and look.grain is None and look.blur <= 0:
+    is_plain = look.relit is None and look.grain is None and look.saturation == 1
+    if is_plain and look.blur <= 0 and look.opacity == 1:
         return shown if look.gain == shown.gain else replace(shown, gain=look.gain)
     kept = work.lit
     if kept is None or kept[0] is not shown or kept[1] is not look:

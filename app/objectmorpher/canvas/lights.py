@@ -16,6 +16,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.document.model import Document, Placement, Plate
+from objectmorpher_core.document.settings import AS_IN_THE_PHOTO
 
 from ..editor.view import ViewState
 from .layer import CanvasLayer, PosedObject
@@ -69,11 +70,11 @@ class Lights:
 
         k, item = own.k, own.item
         shares = (item.harmony, item.relight, item.grain, item.defocus)
-        has_any = item.shadow.strength or any(shares)
+        has_any = item.shadow.strength or any(shares) or item.finish != AS_IN_THE_PHOTO
         if not item.is_moved or not item.is_visible or not has_any:
             self._kept.pop(k, None)
             return NOTHING
-        sources = (own.posed, item.shadow, *shares, document.plate, document.horizon)
+        sources = (own.posed, item.shadow, *shares, item.finish, document.plate, document.horizon)
         kept, now = self._kept.get(k), time.monotonic()
         if kept is None or not same(kept.sources, sources):
             lit = self._work(document, own, is_hurried)()

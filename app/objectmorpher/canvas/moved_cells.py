@@ -23,7 +23,7 @@ def mark_moved(free, rest, world, lens, corner, scale, tolerance, has_left):
             if z <= 0.0:  # behind the camera
                 continue
             u, v = focal * world[i, 0] / z + cx, focal * world[i, 1] / z + cy
-            if not (u - x) ** 2 + (v - y) ** 2 > tolerance * tolerance:
+            if not (u - x) ** 2 + (v - y) ** 2 > tolerance * abs(tolerance):  # < 0: all have
                 continue
             column, row = int((u - left) * scale // 1), int((v - top) * scale // 1)
             if 0 <= column < width and 0 <= row < height:

@@ -206,6 +206,10 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--hidden", metavar="M.png", help="a mask of its parts that are hidden behind something")
     add("--decontaminate", type=float, metavar="S",
         help="take this share of the background's colour out of its edge, 0 to 1")  # fmt: skip
+    add("--opacity", type=float, metavar="S", help="how opaque it is, 0 to 1 (default)")
+    add("--exposure", type=float, metavar="STOPS", help="brighten or darken it, -3 to 3 stops")
+    add("--warmth", type=float, metavar="W", help="its colour, -1 (blue) to 1 (amber)")
+    add("--saturation", type=float, metavar="S", help="its colours, 0 (grey) to 2; default 1")
     add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
     add("--flip", action="store_true", default=None, help="turn that file upside down")
     add = parser.add_argument_group("deforming").add_argument

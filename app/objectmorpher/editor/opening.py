@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
+from objectmorpher_core.base.arrays import RGB
 from objectmorpher_core.base.limits import FILE_BYTES as MAX_BYTES
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
@@ -96,3 +98,40 @@ def _read(path: Path, progress: Progress) -> bytes:
             parts.append(block)
             progress(0.3 * min(len(parts) * BLOCK / max(size, 1), 1.0), "")
     return b"".join(parts)
+
+
+# Small pictures of files, for the list in which one is chosen.
+
+THUMB = 128  # px, longer side
+MOST_BYTES = 1 << 28  # of a file that is read for it
+JPEG = b"\xff\xd8\xff"
+
+
+def read_thumbnail(path: Path) -> RGB | None:
+    """Return the photo of a file or session, at most `THUMB` px; None of what is no picture."""
+    from objectmorpher_core.session.zip import Zip
+
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            return None
+        if path.suffix.lower() != SESSION_ENDING:
+            return _shrunk(path.read_bytes())
+        with path.open("rb") as file, Zip(file, "session") as archive:
+            name = next((name for name in archive.names if name.startswith("photo/")), None)
+            return None if name is None else _shrunk(archive.read(name, MOST_BYTES))
+    except Exception:  # Pillow raises whatever a broken file makes it stumble over
+        return None
+
+
+def _shrunk(data: bytes) -> RGB:
+    """A picture file's pixels; a JPEG is decoded at a fraction of its size."""
+    import numpy as np
+    from PIL import Image, ImageOps
+
+    from objectmorpher_core.pictures.image import at_most, read_picture, to_u8
+
+    if data.startswith(JPEG):
+        with Image.open(io.BytesIO(data), formats=["JPEG"]) as image:
+            image.draft("RGB", (2 * THUMB, 2 * THUMB))
+            return at_most(np.array(ImageOps.exif_transpose(image).convert("RGB")), THUMB)
+    return to_u8(at_most(read_picture(data).pixels, THUMB))

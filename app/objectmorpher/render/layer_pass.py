@@ -179,7 +179,12 @@ class LayerPass:
 
 
 def _appearance(thing: CanvasLayer | SplatObject) -> dict[str, Any]:
-    return {"opacity": TINT if thing.is_tint else 1.0, "gain": thing.gain}
+    opacity, saturation = 1.0, 1.0
+    if isinstance(thing, SplatObject):
+        opacity, saturation = thing.opacity, thing.saturation
+    if thing.is_tint:
+        opacity = TINT
+    return {"opacity": opacity, "saturation": saturation, "gain": thing.gain}
 
 
 def _defines(scene: Scene, is_marked: bool, is_over: bool) -> list[str]:

@@ -45,6 +45,8 @@ class SplatObject:
     relit: Relit | None = None  # and of each place
     grain: Grain | None = None  # and added to them
     blur: float = 0.0  # px of the photo, standard deviation, before all that
+    saturation: float = 1.0  # after all that
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,7 @@ WARMER = np.array([0.30, -0.06, -0.66]) / np.linalg.norm([0.30, -0.06, -0.66])
 COLOUR = 0.5  # share of the ratio's colour that counts
 MIDDLE = (20, 80)  # percentiles of luminance: what is darker or brighter is not asked
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+LUMA = np.array([0.299, 0.587, 0.114], np.float32)  # of encoded values
 DARK = 1e-3  # linear light below which a ratio says nothing
 COVERED = 0.3  # of a small pixel
 LEAST_PIXELS = 4  # of the small picture
@@ -124,6 +125,15 @@ def lit(colour: F32, alpha: F32, gain: Gain) -> F32:
     if gain == NEUTRAL:
         return colour
     return np.minimum(colour * np.array(gain, np.float32), alpha[..., None])
+
+
+def saturated(colour: F32, alpha: F32, saturation: float) -> F32:
+    """Premultiplied colours (h, w, 3) so many times as far from grey; see light.glsl."""
+    if saturation == 1:
+        return colour
+    grey = (colour @ LUMA)[..., None]
+    changed = grey + np.float32(saturation) * (colour - grey)
+    return np.minimum(np.maximum(changed, 0), alpha[..., None])
 
 
 def lit_rgba(rgba: U8, gain: Gain) -> U8:

@@ -16,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...base.arrays import F32, F64
 from ...base.camera import Camera
 from ...document.model import Document, EditObject, LiftedObject, Matte
-from ...document.settings import Shadow
+from ...document.settings import AS_IN_THE_PHOTO, Shadow
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, build_levels
 from ..plate.plate import plate_cover
@@ -41,6 +41,8 @@ class Lit:
     relit: Relit | None = None
     grain: Grain | None = None
     blur: float = 0.0  # px of the photo, standard deviation; before all the others
+    saturation: float = 1.0  # x as far from grey; after all the others
+    opacity: float = 1.0  # of the whole
 
 
 NOTHING = Lit()
@@ -116,7 +118,7 @@ class Lighting:
         """
         has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
         has_any = has_shadow or has_light or item.relight or item.grain or item.defocus
-        if not item.is_visible or not has_any:
+        if not item.is_visible or not (has_any or item.finish != AS_IN_THE_PHOTO):
             return NOTHING
         assert item.matte is not None, "a lifted object has a matte"
         camera = self._document.photo.camera
@@ -139,7 +141,9 @@ class Lighting:
             else:
                 carried = texture or object_texture(item.matte, item.lifted)
                 grain = find_grain(splats, carried, self.noise, item.grain, camera, blur)
-        return Lit(gain, shade, relit, grain, blur)
+        r, g, b = (a * own for a, own in zip(gain, item.finish.gain, strict=True))
+        own = item.finish.saturation, item.finish.opacity
+        return Lit((r, g, b), shade, relit, grain, blur, *own)
 
     def _defocus(
         self, item: EditObject, splats: PosedSplats, rest: PosedSplats, horizon: float | None

@@ -15,7 +15,7 @@ from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
-from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.settings import Finish, Shadow
 from objectmorpher_core.pipeline import make_plate
 from tests import focussed, shapes
 from tests.app.render.pictures import make_renderer, specified
@@ -129,6 +129,7 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     document = edits.set_relight(edits.set_placement(document, 0, place), 0, 1.0)
     document = edits.set_shadow(document, 0, Shadow(strength=0.7, length=1.2))
     document = edits.set_feather(edits.set_harmony(document, 0, 1.0), 1.5)
+    document = edits.set_finish(document, 0, Finish(0.7, -0.3, 0.2, 0.5))
     cache, view = Cache(), _view()
     cache.frame_time = np.inf
     view.set_zoom(1.0, (80, 60), SIZE)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import Pixels
 from objectmorpher_core.compose.layers import BACKGROUND, EMPTY, PHOTO, UNTOUCHED, Layer, layers
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Photo, Placement
-from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.settings import Finish, Shadow
 from objectmorpher_core.pictures.image import Picture
 from tests import shapes
 from tests.tree import over
@@ -114,3 +115,27 @@ def test_sixteen_bits_stay_sixteen_and_are_more_exact():
     difference, _, pile = off(document)
     assert difference.max() < 0.05
     assert all(layer.pixels.dtype == np.uint16 for layer in pile)
+
+
+@over("finish", [Finish(opacity=0.4), Finish(exposure=-1.0), Finish(0.7, 0.3, 1.0, 0.5)])
+def test_an_object_of_another_finish_is_seen_so_where_it_is_and_in_its_layer(finish):
+    """At rest, too: exactly its own pixels change, by the gain and the share that are asked for."""
+    scene = shapes.scene("ellipse")
+    document = edits.set_finish(scene.document(), 0, finish)
+    difference, pixels, pile = off(document)
+    assert difference.max() <= OFF
+    colour, alpha = scene.cutout()
+    inside = cv2.erode((alpha >= 1).astype(np.uint8), np.ones((9, 9))) > 0
+    plate = document.plate
+    assert plate is not None
+    own = np.minimum(colour[inside] * finish.gain, 1)
+    grey = own @ [[0.299], [0.587], [0.114]]
+    own = np.clip(grey + finish.saturation * (own - grey), 0, 1)
+    wanted = 255 * finish.opacity * own + (1 - finish.opacity) * plate.pixels[inside]
+    assert np.abs(pixels[inside] - wanted).max() <= OFF
+    far = cv2.dilate((alpha > 0).astype(np.uint8), np.ones((41, 41))) == 0
+    assert (pixels[far] == scene.pixels[far]).all()
+    layer = next(layer for layer in pile if layer.name == "Object 1")
+    assert abs(int(layer.pixels[..., 3].max()) - 255 * finish.opacity) <= 1
+    moved_too, _, _ = off(moved(document, MOVES["moved"]))
+    assert moved_too.max() <= OFF

@@ -406,3 +406,18 @@ def test_a_turned_magnified_surface_has_no_holes(name, count, axis):
 def test_a_surface_turned_by_sixty_degrees_shows_no_slit_along_its_rim(axis, sign):
     alpha = _least_alpha(shapes.scene("disc", 6000).with_plain_edge(), axis, sign * 60.0)
     assert alpha.min() >= 0.9
+
+
+def test_no_line_is_seen_through_beside_a_rim_that_has_turned():
+    """A convex outline stays one: nothing inside it is more transparent than what lies around."""
+    for name in ("ellipse", "disc"):
+        item = shapes.scene(name, 3000).with_plain_edge()
+        for placement in (
+            Placement(turn=(8, 0, 0)), Placement(turn=(-20, 0, 0)), Placement(turn=(0, 12, 0)),
+        ):  # fmt: skip
+            splats = item.puppet.posed(None, placement)
+            alpha = tiles.render(splats, item.texture, item.camera, item.camera).alpha
+            around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))
+            line = cv2.morphologyEx(alpha, cv2.MORPH_CLOSE, around) - alpha
+            assert line.max() < 0.2, (name, placement.turn)  # half of it and more without closing
+            assert line.sum() < 8, (name, placement.turn)  # px; a line all along has about 50

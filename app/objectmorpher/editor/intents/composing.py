@@ -15,7 +15,7 @@ from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
-from objectmorpher_core.document.settings import Hint, Shadow
+from objectmorpher_core.document.settings import Finish, Hint, Shadow
 
 from ...canvas.layer import CanvasLayer
 from ...canvas.memo import same
@@ -343,6 +343,10 @@ class Composing:
 
     def preview_defocus(self, defocus: float) -> None:
         self._preview(lambda document, k: edits.set_defocus(document, k, defocus))
+
+    def preview_finish(self, finish: Finish) -> None:
+        """Previews another opacity and other colours of the current object."""
+        self._preview(lambda document, k: edits.set_finish(document, k, finish))
 
     def preview_feather(self, feather: float) -> None:
         self._preview(lambda document, _: edits.set_feather(document, feather))

@@ -6,20 +6,58 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
+from objectmorpher_core.base.arrays import RGB
+
 from ...editor.editor import Editor
 from ...editor.filing import Dialog
+from ...editor.opening import PHOTO_ENDINGS, SESSION_ENDING, read_thumbnail
 from ...system.texts import t
 from ..widgets.modal import is_dismissed, modal
 from ..widgets.theme import Icon, theme
-from ..widgets.widgets import FILL, Emphasis, button, icon_button, note, shortened, shown_path
+from ..widgets.widgets import (
+    FILL,
+    Emphasis,
+    button,
+    icon_button,
+    note,
+    pictures,
+    shortened,
+    shown_path,
+    text_top,
+)
 
 WIDTH, HEIGHT = 640.0, 480.0  # points
 ROW = 28.0
+TALL = 44.0  # of rows with a picture
+THUMB = (60.0, 40.0)  # room for it
+THUMBNAIL = "thumbnail"  # kind of chores
 VERBS = {
     Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
     Dialog.MASK_OPEN: "Import", Dialog.SHAPE_OPEN: "Use", Dialog.MASK_SAVE: "Export",
     Dialog.MODEL_OPEN: "Use", Dialog.MODEL_FOLDER: "Use",
 }  # fmt: skip
+
+
+class _Thumbnails:
+    """Small pictures of the files that are in sight, read one after another beside the window."""
+
+    def __init__(self) -> None:
+        self._found: dict[Path, RGB | None] = {}  # None: it is no picture
+
+    def of(self, editor: Editor, path: Path) -> RGB | None:
+        """Return the picture of a file; None where it has none, or not yet."""
+        if path not in self._found and not editor.chores.is_busy(THUMBNAIL):
+            editor.chores.start(
+                "Reading a thumbnail", lambda progress: read_thumbnail(path),
+                done=lambda found: self._found.update({path: found}),
+                failed=lambda error: self._found.update({path: None}),
+                kind=THUMBNAIL, is_quiet=True,
+            )  # fmt: skip
+        return self._found.get(path)
+
+    def forget(self) -> None:
+        """A folder is listed anew: its files may have changed."""
+        self._found = {}
 
 
 class FileChooser:
@@ -34,6 +72,7 @@ class FileChooser:
         self._is_first = False
         self._entries: list[Path] = []
         self._replacing: Path | None = None  # asked whether it may be overwritten
+        self._thumbnails = _Thumbnails()
 
     def open(self, dialog: Dialog, suggestion: Path, endings: tuple[str, ...]) -> None:
         """`suggestion`: a folder, or a file's path."""
@@ -56,7 +95,7 @@ class FileChooser:
     def _draw(self, editor: Editor) -> None:
         is_entered = self._draw_path()
         self._is_first = False
-        chosen = self._draw_list()
+        chosen = self._draw_list(editor)
         is_confirmed, is_cancelled = self._draw_foot()
         if is_cancelled or is_dismissed():
             self._close()
@@ -74,7 +113,7 @@ class FileChooser:
         )
         return is_entered and bool(self._name)
 
-    def _draw_list(self) -> Path | None:
+    def _draw_list(self, editor: Editor) -> Path | None:
         """Folders and files; a file that was double-clicked."""
         if icon_button(Icon.UP, "up", t("One folder up")):
             self._enter(self._folder.parent)
@@ -90,7 +129,7 @@ class FileChooser:
         imgui.begin_child("##files", ImVec2(0, -foot), flags)
         chosen = None
         for entry in self._entries:
-            chosen = self._draw_entry(entry) or chosen
+            chosen = self._draw_entry(editor, entry) or chosen
         if not self._entries:
             note(t("No such files here."))
         imgui.end_child()
@@ -98,16 +137,22 @@ class FileChooser:
         imgui.pop_style_color()
         return chosen
 
-    def _draw_entry(self, entry: Path) -> Path | None:
+    def _draw_entry(self, editor: Editor, entry: Path) -> Path | None:
         is_folder = entry.is_dir()
         icon = Icon.FOLDER if is_folder else Icon.IMAGE
         flags = imgui.SelectableFlags_.allow_double_click
-        height = ImVec2(0, theme.pt(ROW))
+        has_picture = not is_folder and entry.suffix.lower() in (*PHOTO_ENDINGS, SESSION_ENDING)
+        height = ImVec2(0, theme.pt(TALL if has_picture else ROW))
         is_current = entry.name == self._name
+        start = imgui.get_cursor_screen_pos()
         imgui.push_style_var(imgui.StyleVar_.selectable_text_align, ImVec2(0, 0.5))
-        label = f"{icon}   {entry.name}"
+        label = f"##{entry.name}" if has_picture else f"{icon}   {entry.name}"
         is_clicked = imgui.selectable(label, is_current, flags, height)[0]
         imgui.pop_style_var()
+        if has_picture and imgui.is_item_visible():
+            _draw_picture(self._thumbnails.of(editor, entry), icon, start)
+            at = ImVec2(start.x + theme.pt(THUMB[0] + 12), text_top(start, height.y))
+            imgui.get_window_draw_list().add_text(at, theme.u32("text"), entry.name)
         if not is_clicked:
             return None
         if is_folder:
@@ -164,4 +209,20 @@ class FileChooser:
         except OSError:
             return
         self._folder, self._is_first = folder.resolve(), True  # the field has the keys again
+        self._thumbnails.forget()
         self._entries = folders + sorted(files, key=lambda e: e.name.lower())
+
+
+def _draw_picture(picture: RGB | None, icon: str, start: ImVec2) -> None:
+    """A file's picture in the middle of its room at the left of the row, or an icon there."""
+    draw, (width, height) = imgui.get_window_draw_list(), THUMB
+    if picture is None:
+        at = ImVec2(start.x + theme.pt(width / 2 - 8), text_top(start, theme.pt(TALL)))
+        draw.add_text(at, theme.u32("secondary"), icon)
+        return
+    scale = min(width / picture.shape[1], height / picture.shape[0])
+    across, down = theme.pt(scale * picture.shape[1]), theme.pt(scale * picture.shape[0])
+    left = round(start.x + (theme.pt(width) - across) / 2)
+    top = round(start.y + (theme.pt(TALL) - down) / 2)
+    end = ImVec2(left + round(across), top + round(down))
+    draw.add_image(pictures.texture(picture), ImVec2(left, top), end)

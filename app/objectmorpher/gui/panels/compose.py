@@ -10,7 +10,9 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core import compose
 from objectmorpher_core.document.settings import (
     LEAST_FEATHER,
+    MOST_EXPOSURE,
     MOST_FEATHER,
+    MOST_SATURATION,
     MOST_SHADOW,
     USUAL_DEFOCUS,
     USUAL_GRAIN,
@@ -60,6 +62,8 @@ def draw_compose(editor: Editor) -> None:
     if not editor.is_lifted:
         note(t("Lift an object first."))
         return
+    _draw_finish(editor)  # first: what it changes adds fields below
+    rule()
     _draw_background(editor)
     rule()
     _draw_shadow(editor)
@@ -249,6 +253,25 @@ def _draw_light(editor: Editor) -> None:
     note(t("Light around its new place; light that stays where it was while it turns."))
     note(t("Grain: the photo's own, where moving the object has smoothed it."))
     note(t("Focus: nearer or farther, as blurred as the photo is there."))
+
+
+def _draw_finish(editor: Editor) -> None:
+    heading(t("Object"))
+    assert editor.object is not None
+    finish, preview = editor.object.finish, editor.composing.preview_finish
+    rows = (
+        (Number(t("Opacity"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100.0), "opacity", 100.0),
+        (Number(t("Exposure"), "%+.2f", 0.01, 0.25, 0.0, -MOST_EXPOSURE, MOST_EXPOSURE),
+         "exposure", 1.0),
+        (Number(t("Warmth"), "%+.0f", 0.5, 5.0, 0.0, -100.0, 100.0), "warmth", 100.0),
+        (Number(t("Saturation"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100 * MOST_SATURATION),
+         "saturation", 100.0),
+    )  # fmt: skip
+    for number, name, unit in rows:
+        change = number_field(number, unit * getattr(finish, name))
+        changed = replace(finish, **{name: change.value / unit})
+        _take(editor, change, lambda changed=changed: preview(changed), t("Look of object"))
+    note(t("Exposure in stops; warmth from blue to amber."))
 
 
 def _draw_edge(editor: Editor) -> None:

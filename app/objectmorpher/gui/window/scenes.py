@@ -131,6 +131,7 @@ def splat_objects(document: Document, frame: Frame) -> tuple[SplatObject | Canva
         )  # fmt: skip
         if not part.is_painted:
             light = {"gain": look.gain, "relit": look.relit, "grain": look.grain}
-            item = replace(item, **light, blur=look.blur)
+            own = {"saturation": look.saturation, "opacity": look.opacity}
+            item = replace(item, **light, **own, blur=look.blur)
         found.append(item)
     return tuple(found)
