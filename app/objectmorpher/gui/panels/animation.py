@@ -41,9 +41,9 @@ def _draw_stations(editor: Editor) -> None:
     shown, side = keying.shown, theme.pt(STATION)
     start, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     step = min((room - side) / max(keying.count - 1, 1), 2 * side)
-    ends = (ImVec2(start.x + side / 2 + n * step, start.y + side / 2)
-            for n in (0, keying.count - 1))  # fmt: skip
-    draw.add_line(*ends, theme.u32("line"), theme.pt(2))
+    first = ImVec2(start.x + side / 2, start.y + side / 2)
+    last = ImVec2(first.x + (keying.count - 1) * step, first.y)
+    draw.add_line(first, last, theme.u32("line"), theme.pt(2))
     for n in range(keying.count):
         imgui.set_cursor_screen_pos(ImVec2(start.x + n * step, start.y))
         if drawn_button(f"##key{n}", ImVec2(side, side)):
