@@ -76,4 +76,4 @@ def test_a_fault_of_native_code_is_noted(tmp_path: Path, where: str) -> None:
     assert (ended.returncode != 0) == (where == "here")
     noted = (tmp_path / "objectmorpher-crashes.log").read_text()
     assert "Fatal Python error: Aborted" in noted
-    assert ("_work" in noted) == (where == "worker")
+    assert ("in work\n" in noted) == (where == "worker")
