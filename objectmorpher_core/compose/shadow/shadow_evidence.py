@@ -61,7 +61,7 @@ WEIGHTS = {
 }  # fmt: skip
 BIAS = -4.81
 MOST_TINT = 0.6  # x its darkness: what changes colours by more is another material
-SURE = 2.1  # margin: one in fifty of the scenes without a shadow has a higher score
+SURE = 2.1  # margin: 11 of 295 scenes without a shadow that were held out have a higher score
 LIKELY = 0.7  # margin where somebody has asked for the shadow, sees it outlined, and can refuse
 
 
