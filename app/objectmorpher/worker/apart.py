@@ -12,10 +12,13 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from objectmorpher_core.base import learned
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 HERE = ("models setup", "plugin", "completion", "warm-up")  # commands of the copy itself
 
@@ -103,6 +106,8 @@ def work_apart(arguments: Sequence[str]) -> int:
 
         connection = PipeConnection(int(number))
     else:
+        from multiprocessing.connection import Connection
+
         connection = Connection(int(number))
     work(connection, Flag(Path(stop)), tuple(filter(None, warm.split(","))), None)
     return 0
