@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from objectmorpher_core.base import learned
 
 if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
+    from .wire import Connection
 
 HERE = ("models setup", "plugin", "completion", "warm-up")  # commands of the copy itself
 
