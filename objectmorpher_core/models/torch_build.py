@@ -112,11 +112,11 @@ def this_machine() -> TorchMachine:
         said = subprocess.run(asked, capture_output=True, text=True, timeout=10, check=True).stdout
     except (OSError, subprocess.SubprocessError):
         return TorchMachine(system, processor, has_amd=_has_amd(AMD_NODES))
-    return machine_told(system, processor, said)
+    return parse_nvidia_smi(system, processor, said)
 
 
-def machine_told(system: str, processor: str, said: str) -> TorchMachine:
-    """The machine of which nvidia-smi has `said` "driver, capability", a line for each card."""
+def parse_nvidia_smi(system: str, processor: str, said: str) -> TorchMachine:
+    """Return the machine for what nvidia-smi has `said`: "driver, capability", a line a card."""
     rows = [[word.strip() for word in line.split(",")] for line in said.splitlines()]
     found = [row for row in rows if row[0].partition(".")[0].isdigit()]
     if not found:

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 import hands
-from ball import lift_ball, made_photo, open_file, wait_until
+from editor_steps import lift_ball, made_photo, open_file, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
 from objectmorpher.editor.view import ViewState

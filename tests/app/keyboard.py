@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from ball import HEIGHT, WIDTH
+from editor_steps import HEIGHT, WIDTH
 from hands import Hands
 
 SLOW, STAYS = 2.0, 0.15  # s that a busy machine may take; s without a change

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ball import CENTRE, lift_ball, open_file, wait_for_jobs, wait_until
+from editor_steps import CENTRE, lift_ball, open_file, wait_for_jobs, wait_until
 from objectmorpher.cli import parser as cli
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings, read_settings, settings_path, write_settings

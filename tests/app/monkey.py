@@ -504,7 +504,7 @@ def prepared(display: str, folder: Path) -> tuple[dict[str, str], Place]:
     """The surroundings of a window: a photo, a home, and no network."""
     from PIL import Image
 
-    from ball import made_photo
+    from editor_steps import made_photo
 
     place = Place(folder)
     Image.fromarray(made_photo()).save(place.photo)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from ball import open_file, wait_for_jobs
+from editor_steps import open_file, wait_for_jobs
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ball import wait_until
 from edit_until_killed import base_document, step_document
+from editor_steps import wait_until
 from hands import ROOT
 from objectmorpher.editor.autosave import recovery_root
 from objectmorpher.editor.editor import Editor

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from ball import CENTRE, wait_for_jobs, wait_until
+from editor_steps import CENTRE, wait_for_jobs, wait_until
 from objectmorpher.commands import run, take_next_step
 from objectmorpher.editor.candidate import CANDIDATE
 from objectmorpher.editor.editor import Editor

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import HEIGHT, WIDTH
+from editor_steps import HEIGHT, WIDTH
 from hands import Hands, opened, x_display
 from objectmorpher.system import clipboard
 from objectmorpher.system.clipboard import ClipboardError, x11

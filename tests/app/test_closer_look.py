@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ball import CENTRE, HEIGHT, WIDTH, wait_for_jobs
+from editor_steps import CENTRE, HEIGHT, WIDTH, wait_for_jobs
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import Combine, Question

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ball import wait_for_jobs, wait_until
+from editor_steps import wait_for_jobs, wait_until
 from objectmorpher.canvas.frame import build_frame
 from objectmorpher.canvas.layer import FrameObject
 from objectmorpher.canvas.layers import FRAME

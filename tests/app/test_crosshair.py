@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ball import CENTRE, wait_for_jobs
+from editor_steps import CENTRE, wait_for_jobs
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.shortcuts import Shortcuts
 from objectmorpher.editor.view import ToolName

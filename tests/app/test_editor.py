@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import CENTRE, lift_ball, open_file, wait_for_jobs
+from editor_steps import CENTRE, lift_ball, open_file, wait_for_jobs
 from objectmorpher.commands import COMMANDS, next_step, run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog

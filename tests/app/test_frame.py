@@ -9,7 +9,7 @@ from types import FrameType
 import numpy as np
 import pytest
 
-from ball import wait_until
+from editor_steps import wait_until
 from objectmorpher.canvas.derived import Derived
 from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.layer import FrameObject

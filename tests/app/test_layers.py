@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from ball import wait_for_jobs
+from editor_steps import wait_for_jobs
 from hands import PATIENCE
 from objectmorpher.canvas.blend import CELL
 from objectmorpher.canvas.frame import build_frame

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
+from editor_steps import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import CENTRE, open_file, wait_for_jobs, wait_until
+from editor_steps import CENTRE, open_file, wait_for_jobs, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.opening import THUMB, read_thumbnail
 from objectmorpher.editor.recovery import Left

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import CENTRE, HEIGHT, WIDTH
+from editor_steps import CENTRE, HEIGHT, WIDTH
 from gimp_stub import make_gimp
 from hands import ROOT, opened
 from objectmorpher.__main__ import main

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ball import wait_until
 from edit_until_killed import base_document, step_document
+from editor_steps import wait_until
 from objectmorpher.editor.autosave import LOCK, recovery_root
 from objectmorpher.editor.editor import Editor
 from objectmorpher.system.file_lock import FileLock

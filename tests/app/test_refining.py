@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ball import wait_until
+from editor_steps import wait_until
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName

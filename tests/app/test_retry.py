@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import job_functions
-from ball import open_file, wait_for_jobs
+from editor_steps import open_file, wait_for_jobs
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher_core.document import edits

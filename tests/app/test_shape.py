@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ball import open_file, wait_for_jobs
+from editor_steps import open_file, wait_for_jobs
 from objectmorpher.canvas.derived import MOST_SHAPES
 from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.shape import CanvasShape, build_shape, rehearse

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ball import CENTRE, lift_ball, wait_for_jobs
+from editor_steps import CENTRE, lift_ball, wait_for_jobs
 from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Painted, Selecting, ToolName

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import objectmorpher_core as om
-from ball import wait_until
+from editor_steps import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.recovery import _left_in, when
 from objectmorpher_core.base.files import OutputError

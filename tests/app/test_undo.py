@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from ball import wait_for_jobs
+from editor_steps import wait_for_jobs
 from hands import PATIENCE, ROOT
 from objectmorpher.commands import COMMANDS, GROUPS, run, why_not
 from objectmorpher.editor.editor import Editor

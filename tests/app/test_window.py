@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import CENTRE, HEIGHT, WIDTH
+from editor_steps import CENTRE, HEIGHT, WIDTH
 from hands import PATIENCE, ROOT, Hands, opened
 from tests.tree import quick
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ball import CENTRE
+from editor_steps import CENTRE
 from hands import ROOT, Hands, opened
 from test_window import screen_xy
 

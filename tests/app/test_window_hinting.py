@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import lift_ball
+from editor_steps import lift_ball
 from hands import ACCENT, opened
 from objectmorpher.editor.editor import Editor
 from objectmorpher_core.session.file import save_session

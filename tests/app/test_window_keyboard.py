@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import CENTRE, WIDTH
+from editor_steps import CENTRE, WIDTH
 from hands import Hands, opened
 from keyboard import Keys
 from test_window import POSE_TOOL, PRIMARY

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ball import CENTRE
+from editor_steps import CENTRE
 from hands import opened
 from test_window import POSE_TOOL, PRIMARY, screen_xy
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ball import CENTRE
+from editor_steps import CENTRE
 from hands import Hands, opened
 from objectmorpher_core import segment
 from test_window import PRIMARY, screen_xy

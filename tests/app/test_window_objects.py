@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ball import lift_ball
+from editor_steps import lift_ball
 from hands import ACCENT, Hands, opened
 from objectmorpher.editor.editor import Editor
 from objectmorpher_core.document import edits

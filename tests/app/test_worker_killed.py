@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import job_functions
-from ball import wait_for_jobs, wait_until
+from editor_steps import wait_for_jobs, wait_until
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import READ, WRITE

@@ -53,10 +53,10 @@ def build_blend(
         has_left = leaves_a_hole(document.objects, own.k)
         reach = REACH * splats.rest.spacing_px * max(item.placement.scale, 1.0)
         reach += reach_of(lit.blur)
-        still = max(composite.STILL, TOLERANCE / view.zoom)
+        least = max(composite.STILL, TOLERANCE / view.zoom) ** 2
         if item.finish != AS_IN_THE_PHOTO:
-            still = -1.0  # also what has not moved
-        mark = (still, has_left)
+            least = -1.0  # also what has not moved
+        mark = (least, has_left)
         apart = _distance(splats, world, document.photo.camera, view, mark)
         distance = np.minimum(distance, apart - reach)
     margin = document.feather * hole_margin(*document.photo.size)
@@ -74,7 +74,7 @@ def _distance(
 ) -> F32:
     """(h, w) photo px from each cell to what moved, on the canvas or a little beside it.
 
-    `mark`: the photo px from which on a Gaussian has moved, and whether it has left a hole.
+    `mark`: the squared photo px from which on a Gaussian has moved, and whether it has left a hole.
     """
     from .moved_cells import mark_moved
 

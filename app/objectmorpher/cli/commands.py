@@ -63,10 +63,8 @@ def run_doctor(options: argparse.Namespace) -> None:
         f"  models are kept in {models.folder()}, {machine.disk / 2**30:.0f} GB free",
     ]
     if installation.is_frozen():
-        told = (
-            f"An installer brought this copy: `{models.EXTRA}` adds PyTorch beside it, or a server"
-        )
-        lines += ["", f"{told} of yours has it."]
+        lines += ["", "An installer brought this copy. PyTorch can be added beside it, by"]
+        lines += [f"`{models.EXTRA}`, or a server of yours has it."]
     for stage in stages:
         lines += ["", f"{stage.name}: {stage.uses}, {stage.why}"]
         lines += [f"  not {name}: {reason}" for name, reason in stage.others]

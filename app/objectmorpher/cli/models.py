@@ -118,19 +118,19 @@ def _get_set(id: str, options: argparse.Namespace) -> None:
 
 def _set_up(options: argparse.Namespace) -> None:
     """The environment that holds PyTorch: made, brought up to date, or removed."""
-    from objectmorpher_core.base import learned
-    from objectmorpher_core.models import environment, torch_build
+    from objectmorpher_core.base import torch_environment
+    from objectmorpher_core.models import torch_build, torch_setup
 
     if options.is_undone:
-        size = environment.unmake()
-        _write(f"removed {learned.folder()}, {_size(size)}")
+        size = torch_setup.unmake()
+        _write(f"removed {torch_environment.folder()}, {_size(size)}")
         return
     if options.id:
         raise UsageError(f"models setup takes no name such as {options.id!r}")
     if options.wheels and not options.wheels.is_dir():
         raise UsageError(f"{options.wheels} is no folder")
     build = torch_build.build_for(torch_build.this_machine(), options.build or "")
-    plan = environment.plan(build, options.wheels)
+    plan = torch_setup.plan(build, options.wheels)
     told = f"PyTorch in the build {build.name}, because {build.why}"
     if plan.wheels is None:
         told += f": about {plan.download / 1e9:.1f} GB to download"
@@ -140,7 +140,7 @@ def _set_up(options: argparse.Namespace) -> None:
         told += f": from {plan.wheels} into {plan.folder}"
     _consent(told, "PyTorch", options.is_agreed, "install")
     with progress_bar("Installing PyTorch") as progress:
-        made = environment.make(plan, progress)
+        made = torch_setup.make(plan, progress)
     _write(f"PyTorch {made.torch}: {plan.folder}, {_size(made.size)}")
 
 

@@ -1,7 +1,8 @@
-"""The program's sources in the environment of the learned models, beside an installer's copy.
+"""Runs the program's sources in the environment that holds PyTorch, beside an installer's copy.
 
-It is a command of the command line, or the worker process of the window; the core's
-`base/learned.py` says when. Multiprocessing cannot start it: it would start the copy itself.
+What runs there is a command of the command line, or the worker process of the window; the core's
+`base/torch_environment.py` says when. Multiprocessing cannot start that process: it would start the
+copy itself.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from objectmorpher_core.base import learned
+from objectmorpher_core.base import torch_environment
 
 if TYPE_CHECKING:
     from .wire import Connection
@@ -27,10 +28,10 @@ def run_command(arguments: Sequence[str]) -> int | None:
     """Run a command in the environment; its exit code. None where the program runs it itself."""
     if any(" ".join(arguments).startswith(command) for command in HERE):
         return None
-    command = learned.apart(*arguments)
+    command = torch_environment.apart(*arguments)
     if command is None:
         return None
-    return subprocess.run(command, env=learned.apart_variables(), check=False).returncode
+    return subprocess.run(command, env=torch_environment.apart_variables(), check=False).returncode
 
 
 class Flag:
@@ -72,17 +73,17 @@ class ApartProcess:
     ) -> None:
         self._stop = stop
         number = theirs.fileno()
-        told = [learned.WORKER, str(number), str(stop.path), ",".join(warm)]
+        told = [torch_environment.WORKER, str(number), str(stop.path), ",".join(warm)]
         if sys.platform == "win32":
             os.set_handle_inheritable(number, True)
             start = subprocess.STARTUPINFO(lpAttributeList={"handle_list": [number]})
             self._process = subprocess.Popen(
-                [*command, *told], env=learned.apart_variables(), startupinfo=start,
+                [*command, *told], env=torch_environment.apart_variables(), startupinfo=start,
                 creationflags=subprocess.CREATE_NO_WINDOW,
             )  # fmt: skip
         else:
             self._process = subprocess.Popen(
-                [*command, *told], env=learned.apart_variables(), pass_fds=[number]
+                [*command, *told], env=torch_environment.apart_variables(), pass_fds=[number]
             )
         self.pid = self._process.pid
 

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objectmorpher_core.base import learned
+from objectmorpher_core.base import torch_environment
 from objectmorpher_core.base.progress import Cancelled
 
 from ..system.logs import crash_folder, note_crashes
@@ -50,7 +50,7 @@ class Worker:
         self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.stop: Any
         self.process: Any
-        if (command := learned.apart()) is not None:
+        if (command := torch_environment.apart()) is not None:
             self.stop = Flag()
             self.process = ApartProcess(command, theirs, self.stop, warm)
         else:

@@ -24,7 +24,7 @@ from ..shadow.shadow import COARSE, FINE, Shade, StandingObject, cast, ground_no
 from ..silhouette import SKETCHED, sketch, sketched
 from .defocus import PhotoDefocus, StandingPlane, find_defocus
 from .grain import Grain, find_grain, sketch_grain
-from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
+from .harmonize import LUMA, NEUTRAL, Gain, at_strength, light_gain, light_map
 from .noise import Noise, find_noise
 from .relight import Relit, relight
 
@@ -208,7 +208,6 @@ LOOKED = 8  # px of the photo for each of them are enough
 FULL = 0.4  # of a cell, from which it is asked
 LEAST_CELLS = 12
 DARK = 0.02  # encoded luminance: below it nothing is told
-LUMA = np.array([0.299, 0.587, 0.114], np.float32)  # of encoded values
 PATCH = 0.3  # x the object's longer side, over which its colours are alike
 GRAIN = 0.4  # share of their variance that is a cell's own
 COLOURS = 0.3  # standard deviation of them that is expected, logarithm

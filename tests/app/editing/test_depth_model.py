@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ball import CENTRE, open_file, wait_for_jobs
+from editor_steps import CENTRE, open_file, wait_for_jobs
 from objectmorpher.cli import parser as cli
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor

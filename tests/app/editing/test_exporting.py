@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from ball import CENTRE, HEIGHT, WIDTH, wait_for_jobs
+from editor_steps import CENTRE, HEIGHT, WIDTH, wait_for_jobs
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.export_plan import FORMATS, Format, VideoMotion, What

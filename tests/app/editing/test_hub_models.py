@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ball import wait_until
+from editor_steps import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents import models as hub_models
 from objectmorpher.gui.dialogs.models_dialog import GAINS, NAMES, SETS, SIZES, STAGES

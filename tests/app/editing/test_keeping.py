@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import wait_for_jobs
+from editor_steps import wait_for_jobs
 from objectmorpher.canvas.frame import drawn_order
 from objectmorpher.cli import parser as cli
 from objectmorpher.commands import next_step, run, why_not

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ball import wait_until
+from editor_steps import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Backends, Settings
 from objectmorpher_core import compose, segment

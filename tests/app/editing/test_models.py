@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ball import wait_until
+from editor_steps import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.models import NAMES
 from objectmorpher.editor.settings import Settings

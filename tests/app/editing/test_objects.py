@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ball import duplicate, wait_for_jobs
+from editor_steps import duplicate, wait_for_jobs
 from objectmorpher.canvas.frame import build_frame, drawn_order
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ball import wait_until
+from editor_steps import wait_until
 from objectmorpher.cli.parser import main
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings

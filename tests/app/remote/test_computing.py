@@ -15,7 +15,7 @@ import pytest
 from desk import TOKEN, Desk
 from same_values import same_values
 
-from ball import lift_ball
+from editor_steps import lift_ball
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.computing import ADDRESS, TOKEN_FILE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ball import duplicate
+from editor_steps import duplicate
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from ball import CENTRE, RADII
+from editor_steps import CENTRE, RADII
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import PoseView, ToolName

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ball import CENTRE
+from editor_steps import CENTRE
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.rigging import gaps_to_way
 from objectmorpher.editor.view import PoseMode, PoseView, ToolName

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import models
-from objectmorpher_core.base import learned
+from objectmorpher_core.base import torch_environment
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Weight, registry
 
@@ -321,4 +321,4 @@ class HubModels:
 def has_torch() -> bool:
     """Whether networks of PyTorch's can run, here or apart; nothing is imported for that."""
     is_here = find_spec("torch") is not None and find_spec("transformers") is not None
-    return is_here or learned.apart() is not None
+    return is_here or torch_environment.apart() is not None

@@ -38,12 +38,12 @@ def draw_timeline(editor: Editor) -> None:
 
 def _draw_stations(editor: Editor) -> None:
     keying, draw = editor.keying, imgui.get_window_draw_list()
-    shown, side = keying.shown, theme.pt(STATION)
+    shown, last, side = keying.shown, keying.last, theme.pt(STATION)
     start, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     step = min((room - side) / max(keying.count - 1, 1), 2 * side)
     first = ImVec2(start.x + side / 2, start.y + side / 2)
-    last = ImVec2(first.x + (keying.count - 1) * step, first.y)
-    draw.add_line(first, last, theme.u32("line"), theme.pt(2))
+    end = ImVec2(first.x + (keying.count - 1) * step, first.y)
+    draw.add_line(first, end, theme.u32("line"), theme.pt(2))
     for n in range(keying.count):
         imgui.set_cursor_screen_pos(ImVec2(start.x + n * step, start.y))
         if drawn_button(f"##key{n}", ImVec2(side, side)):
@@ -54,7 +54,7 @@ def _draw_stations(editor: Editor) -> None:
         role = "accent" if n == shown else "hovered" if imgui.is_item_hovered() else "raised"
         at, number = ImVec2(start.x + n * step + side / 2, start.y + side / 2), str(n + 1)
         draw.add_circle_filled(at, side / 2 - theme.pt(1), theme.u32(role))
-        if n == keying.last and n != shown:
+        if n == last and n != shown:
             draw.add_circle(at, side / 2 - theme.pt(1), theme.u32("accent"), 0, theme.pt(2))
         size = imgui.calc_text_size(number)
         ink = theme.u32("on_accent" if n == shown else "text")

@@ -1,4 +1,4 @@
-"""A photo of a ball, and the steps of an editor that tests of it share."""
+"""The steps of an editor that tests share, and the photo of a ball that they open."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Makes the environment that holds PyTorch for the learned models, beside the program.
 
-`base/learned.py` says what it is and how it is used.
+`base/torch_environment.py` says what it is and how it is used.
 """
 
 from __future__ import annotations
@@ -13,22 +13,23 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import distributions
 from pathlib import Path
 
-from ..base import installation, learned
+from ..base import installation, torch_environment
 from ..base.files import write_all
 from ..base.progress import Progress
-from .fetch import POLL, SLACK, check_online, reason_of_pip
+from ..base.torch_environment import apart_variables, packages_in, python_in
+from .fetch import SLACK, check_online, reason_of_pip, run_watched
 from .hub_download import bytes_in
 from .registry import ModelError
 from .torch_build import TorchBuild
 
 BUILD = "build.txt"  # written first: a folder without it is none of ours
 SAID = "setup.log"  # what pip has said last
-RATE = 10e6  # bytes a second of the network for which a time is told: 80 Mbit/s
+RATE = 10e6  # bytes a second of the network that the minutes assume: 80 Mbit/s
 UNPACKING = 60e6  # bytes a second that pip unpacks to an ordinary disk
 BORROWED = "borrowed.pth"  # names the folders of the main environment's packages
 EXTRA = "models"
@@ -68,13 +69,13 @@ class SetupPlan:
 def plan(build: TorchBuild, wheels: Path | None = None) -> SetupPlan:
     """Return what `make` is to do for this copy. Raises ModelError: nothing can be made."""
     lines = list(installation.requirements(EXTRA))
-    at, is_apart = learned.folder(), installation.is_frozen()
+    at, is_apart = torch_environment.folder(), installation.is_frozen()
     if is_apart:
         lines += installation.requirements("")
     wanted = tuple(line for line in lines if not re.match(r"torch\b", line))
     if is_apart:
         return SetupPlan(at, _outer_python(), build, wanted, (), wheels)
-    own = str(learned.packages_in(at))
+    own = str(packages_in(at))
     there = importlib.util.find_spec("torch")
     if there is not None and there.origin and own not in there.origin:
         where = Path(there.origin).parents[1]
@@ -83,7 +84,7 @@ def plan(build: TorchBuild, wheels: Path | None = None) -> SetupPlan:
     return SetupPlan(at, sys.executable, build, wanted, borrowed, wheels)
 
 
-def make(plan: SetupPlan, progress: Progress) -> learned.Environment:
+def make(plan: SetupPlan, progress: Progress) -> torch_environment.Environment:
     """Make the environment, or bring one that is there up to date.
 
     Raises ModelError: one sentence. `Cancelled` passes; what is unfinished is not used, and gone on
@@ -96,11 +97,11 @@ def make(plan: SetupPlan, progress: Progress) -> learned.Environment:
     try:
         _begin(plan)
         _install(plan, progress)
-        found = learned.Environment(
+        found = torch_environment.Environment(
             plan.build.name, _torch_in(plan), _version_of(plan.python), not plan.borrowed,
             bytes_in(plan.folder),
         )  # fmt: skip
-        write_all({plan.folder / learned.NOTE: json.dumps(asdict(found)).encode()})
+        write_all({plan.folder / torch_environment.NOTE: json.dumps(asdict(found)).encode()})
     except OSError as error:
         told = error.strerror or error
         raise ModelError(f"{plan.folder} cannot be written: {told}") from error
@@ -110,12 +111,12 @@ def make(plan: SetupPlan, progress: Progress) -> learned.Environment:
 
 def unmake() -> int:
     """Remove the environment, whole or unfinished; the bytes that it had. Raises ModelError."""
-    at = learned.folder()
+    at = torch_environment.folder()
     if not (at / BUILD).is_file():
         raise ModelError(f"there is no environment in {at}")
     size = bytes_in(at)
     try:
-        (at / learned.NOTE).unlink(missing_ok=True)  # first: a half of it is not used
+        (at / torch_environment.NOTE).unlink(missing_ok=True)  # first: a half of it is not used
         shutil.rmtree(at)
     except OSError as error:
         raise ModelError(f"{at} cannot be removed: {error.strerror or error}") from error
@@ -128,16 +129,16 @@ def _begin(plan: SetupPlan) -> None:
     if at.is_dir() and any(at.iterdir()):
         if not (at / BUILD).is_file():
             raise ModelError(f"{at} holds other files, and no environment is made there")
-        (at / learned.NOTE).unlink(missing_ok=True)
+        (at / torch_environment.NOTE).unlink(missing_ok=True)
         is_other = (at / BUILD).read_text(encoding="ascii").strip() != build
-        if is_other or _version_of(str(learned.python_in(at))) != _version_of(plan.python):
+        if is_other or _version_of(str(python_in(at))) != _version_of(plan.python):
             shutil.rmtree(at)
     at.mkdir(parents=True, exist_ok=True)
     write_all({at / BUILD: f"{build}\n".encode()})
-    if not learned.python_in(at).exists():
+    if not python_in(at).exists():
         _run([plan.python, "-m", "venv", "--without-pip", str(at)], plan)
     lines = "\n".join([*plan.borrowed, ""])
-    write_all({learned.packages_in(at) / BORROWED: lines.encode()})
+    write_all({packages_in(at) / BORROWED: lines.encode()})
 
 
 def _check_room(plan: SetupPlan) -> None:
@@ -172,7 +173,11 @@ def _pip(
         raise ModelError(f"{sys.executable} has no pip, which installs packages")
     held_file = plan.folder / "held.txt"
     write_all({held_file: "".join(f"{n}=={v}\n" for n, v in sorted(held.items())).encode()})
-    command = [str(learned.python_in(plan.folder)), str(Path(found.origin).parent), "install"]
+    command = [
+        str(python_in(plan.folder)),
+        str(Path(found.origin).parent),
+        "install",
+    ]
     command += ["--no-cache-dir", "--disable-pip-version-check", "--no-input", "--upgrade"]
     command += ["--progress-bar", "off", "--only-binary=:all:", "-c", str(held_file)]
     if plan.wheels is not None:
@@ -191,40 +196,38 @@ def _run(
     places = {name: str(scratch) for name in ("TMPDIR", "TEMP", "TMP")}
     if plan.wheels is not None:  # no index and no folder that pip's own settings name, either
         places["PIP_CONFIG_FILE"] = os.devnull
-    variables = learned.apart_variables() | places
-    with said.open("wb") as output:
-        child = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, env=variables)
-        try:
-            _wait(child, plan, stage)
-        finally:
-            if child.poll() is None:
-                child.kill()
-                child.wait()
-            shutil.rmtree(scratch, ignore_errors=True)
-    if child.returncode != 0:
+    variables = apart_variables() | places
+    try:
+        code = run_watched(command, said, variables, _watch(plan, stage))
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    if code != 0:
         why = reason_of_pip(said, "it")
         raise ModelError(f"the environment for PyTorch cannot be made: {why}")
 
 
-def _wait(
-    child: subprocess.Popen[bytes], plan: SetupPlan, stage: tuple[Progress, float, float] | None
-) -> None:
-    """Until it ends; the bytes that have come, counted once a second, are the progress."""
+def _watch(
+    plan: SetupPlan, stage: tuple[Progress, float, float] | None
+) -> Callable[[], None]:  # fmt: skip
+    """What shows how far it is while it runs: the bytes that have come, counted once a second."""
+    if stage is None:
+        return lambda: None
+    progress, start, end = stage
     before, share, counted = bytes_in(plan.folder), 0.0, time.monotonic()
-    while child.poll() is None:
-        time.sleep(POLL)
-        if stage is None:
-            continue
+
+    def look() -> None:
+        nonlocal share, counted
         if time.monotonic() > counted + 1.0:
             come = max(bytes_in(plan.folder) - before, 0)
             share, counted = min(come / (plan.download + plan.disk), 1.0), time.monotonic()
-        progress, start, end = stage
         progress(start + share * (end - start), f"installing PyTorch ({plan.build.name})")
+
+    return look
 
 
 def _torch_in(plan: SetupPlan) -> str:
     """The version of the PyTorch that was installed. Raises ModelError."""
-    found = [d.version for d in distributions(path=[str(learned.packages_in(plan.folder))])
+    found = [d.version for d in distributions(path=[str(packages_in(plan.folder))])
              if d.metadata["Name"] == "torch"]  # fmt: skip
     if not found:
         raise ModelError("the environment was made, and PyTorch is not in it")
@@ -247,7 +250,7 @@ def _version_of(interpreter: str) -> str:
     """Such as 3.11; empty for what is no Python with venv."""
     try:
         said = subprocess.run([interpreter, "-c", ASK], capture_output=True, text=True,
-                              timeout=20, check=True, env=learned.apart_variables())  # fmt: skip
+                              timeout=20, check=True, env=apart_variables())  # fmt: skip
     except (OSError, subprocess.SubprocessError):
         return ""
     return ".".join(said.stdout.split())

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 import numpy
 import pytest
 
-from objectmorpher_core.base import installation, learned
-from objectmorpher_core.models import ModelError, environment
-from objectmorpher_core.models.torch_build import TorchMachine, build_for, machine_told
+from objectmorpher_core.base import installation, torch_environment
+from objectmorpher_core.models import ModelError, torch_setup
+from objectmorpher_core.models.torch_build import TorchMachine, build_for, parse_nvidia_smi
 from tests.tree import PYTHONPATH, ROOT
 
 if TYPE_CHECKING:
@@ -67,19 +67,19 @@ def test_each_machine_gets_the_newest_build_that_it_can_run() -> None:
 
 def test_what_the_driver_says_is_understood() -> None:
     two = "550.54.14, 6.1\n550.54.14, 8.9\n"
-    assert machine_told(*LINUX, two) == TorchMachine(*LINUX, "550.54.14", "8.9")
-    assert machine_told(*WINDOWS, "471.11, [N/A]\n").capability == ""
-    assert machine_told(*LINUX, "No devices were found\n").driver == ""
+    assert parse_nvidia_smi(*LINUX, two) == TorchMachine(*LINUX, "550.54.14", "8.9")
+    assert parse_nvidia_smi(*WINDOWS, "471.11, [N/A]\n").capability == ""
+    assert parse_nvidia_smi(*LINUX, "No devices were found\n").driver == ""
 
 
 def test_the_time_and_the_disk_are_those_of_the_build() -> None:
     small, large = (
-        environment.SetupPlan(Path(), "", build_for(TorchMachine(*LINUX), name), (), ("borrowed",))
+        torch_setup.SetupPlan(Path(), "", build_for(TorchMachine(*LINUX), name), (), ("borrowed",))
         for name in ("cpu", "cu128")
     )
     assert small.disk < 2e9 < 5e9 < large.disk and small.minutes < large.minutes
-    alone = environment.SetupPlan(Path(), "", small.build, (), ())
-    assert alone.disk - small.disk == environment.MAIN_DISK
+    alone = torch_setup.SetupPlan(Path(), "", small.build, (), ())
+    assert alone.disk - small.disk == torch_setup.MAIN_DISK
 
 
 LEARNED = ("torch", "transformers", "diffusers", "accelerate", "bitsandbytes", "safetensors",
@@ -122,17 +122,17 @@ def main(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The Python of an environment with what the program needs, and without PyTorch."""
     folder = tmp_path_factory.mktemp("main") / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
-    packages = learned.packages_in(folder)
+    packages = torch_environment.packages_in(folder)
     for there in Path(numpy.__file__).parents[1].iterdir():
         if not there.name.startswith((*LEARNED, "__editable__", "objectmorpher", "_objectm")):
             (packages / there.name).symlink_to(there)
-    return learned.python_in(folder)
+    return torch_environment.python_in(folder)
 
 
 def run(main: Path, at: Path, *words: str, start: str = "") -> subprocess.CompletedProcess[str]:
     """The program in the Python `main`, with the environment in `at`."""
     code = f"import sys; {start}\nfrom objectmorpher.__main__ import main; sys.exit(main())"
-    variables = {**os.environ, "PYTHONPATH": PYTHONPATH, learned.VARIABLE: str(at)}
+    variables = {**os.environ, "PYTHONPATH": PYTHONPATH, torch_environment.VARIABLE: str(at)}
     command = [main, "-c", code, *words]
     return subprocess.run(command, env=variables, capture_output=True, text=True, timeout=120)
 
@@ -159,7 +159,7 @@ def test_an_environment_is_made_used_brought_up_to_date_and_removed(
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("PyTorch 99.0: ")
     assert "torch 99.0" in packages_of(run(main, at, "doctor"))
-    assert not (learned.packages_in(at) / "numpy").exists(), "it is the program's own"
+    assert not (torch_environment.packages_in(at) / "numpy").exists(), "it is the program's own"
 
     newer = tmp_path / "newer"
     shutil.copytree(wheels, newer)
@@ -182,13 +182,13 @@ def test_an_installers_copy_works_in_an_environment_of_another_python(
     wheels: Path, main: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     at = tmp_path / "learned"
-    plan = environment.SetupPlan(
+    plan = torch_setup.SetupPlan(
         at, sys.executable, build_for(TorchMachine(*LINUX), "cpu"), LEARNED[1:],
-        (str(learned.packages_in(main.parents[1])),), wheels,
+        (str(torch_environment.packages_in(main.parents[1])),), wheels,
     )  # fmt: skip
-    made = environment.make(plan, lambda fraction, note: None)
-    note = {**json.loads((at / learned.NOTE).read_text()), "is_apart": True}
-    (at / learned.NOTE).write_text(json.dumps(note))
+    made = torch_setup.make(plan, lambda fraction, note: None)
+    note = {**json.loads((at / torch_environment.NOTE).read_text()), "is_apart": True}
+    (at / torch_environment.NOTE).write_text(json.dumps(note))
     assert made.torch == "99.0" and not made.is_apart
 
     frozen = run(main, at, "doctor", start="sys.frozen = True")
@@ -196,7 +196,7 @@ def test_an_installers_copy_works_in_an_environment_of_another_python(
 
     helpers = str(ROOT / "tests" / "app")
     monkeypatch.syspath_prepend(helpers)
-    monkeypatch.setenv(learned.VARIABLE, str(at))
+    monkeypatch.setenv(torch_environment.VARIABLE, str(at))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([PYTHONPATH, helpers]))
     monkeypatch.setattr(sys, "frozen", True, raising=False)
     import job_functions  # pyright: ignore[reportMissingImports]
@@ -236,25 +236,25 @@ def poll_until(jobs: Jobs, is_reached: Callable[[], bool]) -> None:
 def test_a_copy_that_has_pytorch_wants_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("torch")
     with pytest.raises(ModelError, match="PyTorch is here already"):
-        environment.plan(build_for(TorchMachine(*LINUX)))
+        torch_setup.plan(build_for(TorchMachine(*LINUX)))
 
 
 def test_what_is_in_the_way_is_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     build = build_for(TorchMachine(*LINUX))
-    own = environment.SetupPlan(tmp_path, sys.executable, build, (), (), tmp_path)
+    own = torch_setup.SetupPlan(tmp_path, sys.executable, build, (), (), tmp_path)
     (tmp_path / "letter.txt").write_text("dear reader")
     with pytest.raises(ModelError, match="holds other files"):
-        environment.make(own, lambda fraction, note: None)
+        torch_setup.make(own, lambda fraction, note: None)
     assert (tmp_path / "letter.txt").exists()
     monkeypatch.setattr(shutil, "disk_usage", lambda at: shutil._ntuple_diskusage(10, 9, 1))
     with pytest.raises(ModelError, match="GB are free"):
-        environment.make(own, lambda fraction, note: None)
+        torch_setup.make(own, lambda fraction, note: None)
     monkeypatch.setattr(sys, "frozen", True, raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ModelError, match=r"a Python 3\.11 to 3\.14 with its venv module is needed"):
-        environment.plan(build)
+        torch_setup.plan(build)
 
 
 def test_requirements_of_a_wheel_are_those_of_the_checkout(

@@ -1,6 +1,6 @@
 """The environment beside the program that holds PyTorch for the learned models, and its use.
 
-`objectmorpher models setup` makes it (`models/environment.py`). Where the program runs in a Python
+`objectmorpher models setup` makes it (`models/torch_setup.py`). Where the program runs in a Python
 that packages can be added to, the environment holds PyTorch and the extra's packages alone, made by
 that very Python and held to the versions that are there; `join` puts it behind all else that is
 imported. An installer's copy has a Python that lacks parts of its library: there the environment
