@@ -121,6 +121,8 @@ def run_edit(options: argparse.Namespace) -> None:
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
         check_outputs(inputs, {out: ENDINGS})
         files = {n: path for n, path in extras.items() if not _is_folder(n, path)}
+        for name in extras.keys() - files.keys():
+            _check_folder(extras[name])
         check_outputs(inputs, {path: _endings(EXTRAS[name]) for name, path in files.items()})
         everything = [*outputs, out, *extras.values()]
         if len({path.resolve() for path in everything}) < len(everything):
@@ -172,10 +174,16 @@ def _encoded(name: str, edited: Edited, path: Path, clip: Clip) -> dict[Path, by
     if not _is_folder(name, path):
         return {path: encode_output(EXTRAS[name], edited, path, clip)}
     found = Export(edited.document, edited, clip=clip).files("video", path)
-    if not path.parent.is_dir():
-        raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
     path.mkdir(exist_ok=True)
     return found
+
+
+def _check_folder(path: Path) -> None:
+    """Raises UsageError where no folder of frames can be made."""
+    if path.exists() and not path.is_dir():
+        raise UsageError(f"{path} is a file; a video without an ending is a folder of frames")
+    if not path.parent.is_dir():
+        raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
 
 
 def _endings(what: str) -> tuple[str, ...]:
@@ -203,7 +211,9 @@ def run_replay(options: argparse.Namespace) -> None:
     if options.report:
         wanted[options.report] = (".json",)
     video, clip = options.save_video, Clip(options.video, options.seconds)
-    if video and not _is_folder("save_video", video):
+    if video and _is_folder("save_video", video):
+        _check_folder(video)
+    elif video:
         wanted[video] = _endings("video")
     check_outputs([options.session], wanted)
     with progress_bar("Opening") as progress:
