@@ -140,8 +140,7 @@ def test_the_tiles_are_three_times_as_fast_as_a_classic_viewer_on_software_openg
 
 
 @pytest.mark.slow
-def test_a_frame_costs_less_than_the_square_of_the_gaussians() -> None:
-    """Three times as many take about three times as long; up to five where others compute, too."""
+def test_three_times_the_gaussians_cost_at_most_four_times_the_frame() -> None:
     few, many = cloud_scene(100_000), cloud_scene(300_000)
-    one, three = least([lambda: tiles_frame(few, 0), lambda: tiles_frame(many, 0)], 10)
-    assert three <= 6 * one
+    one, three = least([lambda: tiles_frame(few, 0), lambda: tiles_frame(many, 0)], 40)
+    assert three <= 4 * one

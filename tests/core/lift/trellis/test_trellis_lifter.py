@@ -207,4 +207,5 @@ def test_missing_weights_are_one_sentence_that_says_how_to_get_them(tmp_path, mo
 
 def test_missing_packages_are_one_sentence(monkeypatch):
     monkeypatch.setattr(configs, "PACKAGES", ("torch", "no_such_package"))
-    assert "no_such_package is not installed: " in (TrellisLifter().missing() or "")
+    missing = TrellisLifter().missing()
+    assert missing == "no_such_package is not installed: objectmorpher models setup"
