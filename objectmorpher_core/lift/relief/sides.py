@@ -54,6 +54,7 @@ ELSEWHERE = 300.0  # squared levels that one in the photo costs
 KEPT = 0.85  # share of the coarse colours of a side that stays
 COARSE = 5.0  # small px, of what is coarse
 NEARBY = 2.0  # small px, over which colours are compared
+NEARLY = 1.1  # x the share of a picture of about the right colours: what exceeds 1 is whole
 OTHER = 30.0  # levels, by which the coarse colours of a picture of something else are off
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
@@ -341,7 +342,7 @@ def _alike(colors: F32, wanted: F32, known: F32, sure: F32) -> F64:
         for change in (known - cv2.GaussianBlur(known, (0, 0), COARSE), wanted - colors)
     )
     least = OTHER + float(np.median(usual[sure > HALF]))
-    alike = np.exp(-((off.astype(np.float64) / least) ** 4))
+    alike = np.minimum(NEARLY * np.exp(-((off.astype(np.float64) / least) ** 4)), 1)
     patch = np.ones((2 * RIM - 1,) * 2, np.uint8)
     alike = cv2.erode(cv2.morphologyEx(alike, cv2.MORPH_CLOSE, patch), patch)  # it is of one part
     return np.asarray(cv2.GaussianBlur(alike, (0, 0), NEARBY), np.float64)
