@@ -7,8 +7,9 @@ const SHOWN = {
   ask: ["ask"],
   open: ["drop"],
   select: ["stage", "subject", "without", "undo", "lift", "other"],
-  drag: ["frame", "back", "session", "save", "other"],
+  drag: ["frame", "back", "session", "save", "send", "other"],
 };
+const SENT = ["send"], KEPT = ["session", "save", "other"];  // for another program, and for oneself
 const HINTS = {
   ask: "Enter the token that the server printed when it started.",
   open: "The photo is sent to the computer that serves this page, and nowhere else.",
@@ -76,7 +77,7 @@ function say(text, isWrong = false) {
 function progress(fraction) {
   $("progress").hidden = fraction === null;
   if (fraction !== null) $("progress").value = fraction;
-  for (const id of ["lift", "save", "session"]) $(id).disabled = fraction !== null;
+  for (const id of ["lift", "save", "session", "send"]) $(id).disabled = fraction !== null;
   if (fraction === null) choices();
 }
 
@@ -88,7 +89,8 @@ function choices() {
 
 function show(step) {
   document.body.dataset.step = step;
-  for (const id of ALL) $(id).hidden = !SHOWN[step].includes(id);
+  const unused = edit?.isSent ? KEPT : SENT;
+  for (const id of ALL) $(id).hidden = !SHOWN[step].includes(id) || unused.includes(id);
   say(HINTS[step]);
   choices();
 }
@@ -103,7 +105,12 @@ async function open(file, name) {
   say("Opening the photo");
   const answer = await fetched("web/edits",
     { method: "POST", body: file, headers: { "X-Name": encodeURIComponent(name) } });
-  edit = { ...await answer.json(), isChosen: false };
+  await begun({ ...await answer.json(), isSent: false });
+}
+
+// An edit that another program began is sent back to it.
+async function begun(about) {
+  edit = { ...about, isChosen: false };
   [clicks, isSubject] = [[], false];
   const seen = await fetched(`web/edits/${edit.id}/photo`);
   URL.revokeObjectURL($("photo").src);
@@ -221,7 +228,11 @@ async function save(what) {
   await done("render", {
     what, points: base64(thing.points), quats: base64(thing.quats), turn: thing.turn, shift: thing.shift,
   });
-  const answer = await fetched(`web/edits/${edit.id}/file`);
+  if (what === "layers") {
+    say("The layers are sent back. This page can be closed.");
+    return;
+  }
+  const answer = await fetched(`web/edits/${edit.id}/files/${what}`);
   const named = answer.headers.get("Content-Disposition") || "";
   const link = document.createElement("a");
   link.download = decodeURIComponent(named.split("''")[1] || "edited.png");
@@ -234,6 +245,11 @@ async function save(what) {
 // ---- all together ----------------------------------------------------------------------------
 
 async function begin() {
+  if (sent) {
+    const about = await fetched(`web/edits/${encodeURIComponent(sent)}/about`);
+    await begun({ ...await about.json(), isSent: true });
+    return;
+  }
   show("open");
   await samples();
 }
@@ -253,6 +269,7 @@ $("lift").addEventListener("click", guarded(lift));
 $("back").addEventListener("click", () => show("select"));
 $("session").addEventListener("click", guarded(() => save("session")));
 $("save").addEventListener("click", guarded(() => save("photo")));
+$("send").addEventListener("click", guarded(() => save("layers")));
 $("other").addEventListener("click", () => { stop?.abort(); show("open"); });
 $("ask").addEventListener("submit", guarded(async (event) => {
   event.preventDefault();
@@ -268,9 +285,9 @@ for (const name of ["dragover", "dragleave", "drop"])
     if (file && token) await open(file, file.name);
   }));
 
-const given = new URLSearchParams(location.hash.slice(1)).get("token");
-token = given || sessionStorage.getItem("token") || "";
-if (given) {
+const given = new URLSearchParams(location.hash.slice(1)), sent = given.get("edit");
+token = given.get("token") || sessionStorage.getItem("token") || "";
+if (location.hash) {
   sessionStorage.setItem("token", token);
   history.replaceState(null, "", location.pathname);  // it is not to stand in the history
 }

@@ -6,9 +6,11 @@
     POST /web/edits                      a photo's bytes -> {"id", "size"}
     POST /web/edits/ID/select            {"click": [[x, y]], "not_click": [...], "subject": bool}
     POST /web/edits/ID/lift              {}
-    POST /web/edits/ID/render            {"what": "photo" or "session", "points", "quats", "turn",
-                                         "shift"}: the state of the page of `objectmorpher share`
-    GET  /web/edits/ID/photo|mask|page|file    what these made
+    POST /web/edits/ID/render            {"what": one of FILES, "points", "quats", "turn", "shift"}:
+                                         the state of the page of `objectmorpher share`
+    GET  /web/edits/ID/about             {"id", "size"}
+    GET  /web/edits/ID/photo|mask|page   pictures, and that page
+    GET  /web/edits/ID/files/WHAT        what was rendered last
 
 The last three POST answer with lines of JSON: progress, and at the end {"state": "done"} or a
 sentence in "error". Everything of an edit needs the token; one computation runs at a time.
@@ -67,6 +69,7 @@ MOST_SAID = 1 << 20  # bytes of a question that is no photo
 MOST_CLICKS = 64
 BEAT = 0.2  # s between two lines of a computation
 QUALITY = 90  # of the WebP that the page shows while one selects
+FILES = ("photo", "session", "layers")
 KEPT_ENDINGS = (".jpg", ".jpeg", ".png")  # a photo is given back as what it came; else PNG
 # The page runs the page of `share` in a frame of its own, which brings its programs along.
 POLICY = (
@@ -88,7 +91,7 @@ class WebEdit:
     reading: pipeline.Reading | None = None
     chosen: Document | None = None
     lifted: Document | None = None
-    file: tuple[str, bytes] | None = None  # what is to be saved: name and contents
+    files: dict[str, tuple[str, bytes]] = field(default_factory=dict)  # what is to be saved
     lock: threading.Lock = field(default_factory=threading.Lock)  # one question at a time
 
     @property
@@ -132,19 +135,23 @@ class WebEdit:
     def render(self, asked: Mapping[str, Any], progress: Progress) -> None:
         """Make the file that is to be saved, of the object as the page shows it."""
         document = posed_as_shown(self._lifted(), asked)
+        what = asked.get("what")
+        if what not in FILES:
+            raise EditError(f"what is to be made is one of {', '.join(FILES)}")
         stem, ending = Path(self.name).stem or "photo", Path(self.name).suffix.lower()
         if has_left(document.objects[0]):  # its shadow in the photo goes along
             step = part(progress, 0.0, 0.6)
             document = with_plate(document, EditScript(), frozenset({0}), step).document
-        if asked.get("what") == "session":
-            self.file = f"{stem}.omorph", encode_session(document)
+        if what == "session":
+            self.files[what] = f"{stem}.omorph", encode_session(document)
             return
         edited = pipeline.replay(document, part(progress, 0.6, 1.0))
-        name = f"{stem} edited{ending if ending in KEPT_ENDINGS else '.png'}"
-        self.file = name, encode_output("photo", edited, Path(name))
+        usual = ending if ending in KEPT_ENDINGS else ".png"
+        name = f"{stem} edited{'.psd' if what == 'layers' else usual}"
+        self.files[what] = name, encode_output(what, edited, Path(name))
 
     def show(self, what: str) -> tuple[bytes, str]:
-        """The bytes of "photo", "mask", "page" or "file", and their media type."""
+        """The bytes of "photo", "mask", "page" or a file, and their media type."""
         if what == "photo":
             pixels = at_most(to_u8(self.opened.photo.pixels), LONGEST)
             return encode_picture(Picture(pixels), ".webp", webp_quality=QUALITY), "image/webp"
@@ -156,9 +163,10 @@ class WebEdit:
             return encode_coverage(resized(mask.astype(np.uint8) * 255, width, height)), "image/png"
         if what == "page":
             return encode_page(self._lifted(), 0), "text/html; charset=utf-8"
-        if what != "file" or self.file is None:
+        made = self.files.get(what.removeprefix("files/"))
+        if made is None:
             raise EditError("there is nothing of that name")
-        return self.file[1], "application/octet-stream"
+        return made[1], "application/octet-stream"
 
     def _chosen(self) -> Document:
         if self.chosen is None:
@@ -248,7 +256,7 @@ class WebServer(HttpServer):
             edit = self.edits.get(name)
             if edit is None:
                 raise Refusal(
-                    HTTPStatus.NOT_FOUND, "this edit is not kept any more: open the photo again"
+                    HTTPStatus.GONE, "this edit is not kept any more: open the photo again"
                 )
             self.edits.move_to_end(name)
         return edit
@@ -299,14 +307,18 @@ class _WebHandler(Handler):
         if folder == "/web/samples" and name in self.web.samples:
             self.send_bytes(HTTPStatus.OK, self.web.samples[name].read_bytes(), "image/jpeg")
             return
-        edit, what = self._meant()
+        edit, name, what = self._meant()
+        if what == "about":
+            self.send_json(HTTPStatus.OK, {"id": name, "size": edit.opened.photo.size})
+            return
         try:
             body, kind = edit.show(what)
         except EditError as error:
             raise Refusal(HTTPStatus.NOT_FOUND, str(error)) from error
         headers = {"Content-Length": str(len(body)), "Cache-Control": "no-store"}
-        if what == "file" and edit.file is not None:
-            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(edit.file[0])}"
+        if what.startswith("files/"):
+            name = quote(edit.files[what.removeprefix("files/")][0])
+            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{name}"
         self.send_head(HTTPStatus.OK, kind, headers)
         self.wfile.write(body)
 
@@ -314,7 +326,7 @@ class _WebHandler(Handler):
         if self.path == "/web/edits":
             self._open()
             return
-        edit, what = self._meant()
+        edit, _, what = self._meant()
         works: dict[str, Callable[[Mapping[str, Any], Progress], None]] = {
             "select": edit.select, "lift": edit.lift, "render": edit.render,
         }  # fmt: skip
@@ -339,12 +351,13 @@ class _WebHandler(Handler):
             "id": self.web.add(WebEdit(opened)), "size": opened.photo.size,
         })  # fmt: skip
 
-    def _meant(self) -> tuple[WebEdit, str]:
+    def _meant(self) -> tuple[WebEdit, str, str]:
+        """The edit, its name, and what of it is meant. Raises Refusal."""
         start, _, rest = self.path.partition("/web/edits/")
         name, _, what = rest.partition("/")
         if start or not what:
             raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
-        return self.web.find(name), what
+        return self.web.find(name), name, what
 
     def _carry_out(self, work: Callable[[Progress], None], lock: threading.Lock) -> None:
         """Answer with the progress of `work`, line by line, once it is its turn."""

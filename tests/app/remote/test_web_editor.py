@@ -89,7 +89,7 @@ def test_nonsense_is_answered_with_a_sentence_and_hurts_nobody(server: WebServer
         told = last_line(server, f"{edit}/select", asked)
         assert told["state"] == "failed" and told["error"]
     assert last_line(server, f"{edit}/lift", {})["error"] == "click the object first"
-    for what in ("mask", "page", "file", "elsewhere"):
+    for what in ("mask", "page", "files/photo", "files/x", "elsewhere"):
         assert ask(server, "GET", f"{edit}/{what}")[0] == 404
     assert ask(server, "GET", f"{edit}/photo")[0] == 200
 
@@ -97,7 +97,7 @@ def test_nonsense_is_answered_with_a_sentence_and_hurts_nobody(server: WebServer
 def test_a_few_edits_are_kept_and_the_oldest_gives_way(server: WebServer) -> None:
     photo = (SAMPLES / "bowl.jpg").read_bytes()
     first, *others = [opened(server, photo) for _ in range(MOST_EDITS + 1)]
-    assert ask(server, "GET", f"{first}/photo")[0] == 404
+    assert ask(server, "GET", f"{first}/photo")[0] == 410
     assert all(ask(server, "GET", f"{edit}/photo")[0] == 200 for edit in others)
 
 
