@@ -256,7 +256,9 @@ def test_photoshops_panel_sends_a_layer_and_takes_what_comes_back(tmp_path: Path
     assert told["layers"] == ["Above", ["ObjectMorpher", "Object", "Background"], "Mine"]
     assert told["open"] == 1 and "group above" in told["said"]
     back = PSDImage.open(tmp_path / "back.psd")
-    assert next(iter(back)).name.startswith("Photo") and "Object 1" in {x.name for x in back}
+    assert next(iter(back)).name.startswith("Photo") and "Object 1" in {
+        x.name for x in back.descendants()
+    }
     merged = np.asarray(back.composite().convert("RGB")).astype(int)
     assert (np.abs(merged - np.asarray(photo.convert("RGB"))).max(2) > 30).mean() > 0.02
 
