@@ -12,9 +12,11 @@ import numpy as np
 
 from ..base.arrays import F64
 from ..base.camera import Camera
+from ..base.rotations import turn_of
 from .model import LiftedObject, Placement
 
 NEAREST = 0.02  # x its depth: an object that is held comes no nearer
+SKEW = 1e-3  # of a rotation that was rounded on its way
 
 
 def centre_of(placement: Placement, lifted: LiftedObject, camera: Camera) -> F64:
@@ -30,6 +32,28 @@ def with_centre(
     move = camera.project(np.asarray(centre)) - camera.project(lifted.centre)
     depth = (centre[2] - lifted.centre[2]) / (lifted.diameter * lifted.scale)
     return replace(placement, move=(float(move[0]), float(move[1])), depth=float(depth))
+
+
+def placement_of(motion: np.ndarray, lifted: LiftedObject, camera: Camera) -> Placement:
+    """Return the placement whose `matrix` is `motion` (4, 4), world from world.
+
+    Raises ValueError for what is no turn with one positive scale and a move, and where the centre
+    would be behind the camera.
+    """
+    if not np.isfinite(motion).all():
+        raise ValueError("it is not finite")
+    linear = np.asarray(motion, np.float64)[:3, :3]
+    size = float(np.linalg.det(linear))
+    if size <= 0:
+        raise ValueError("it mirrors the object, or flattens it")
+    scale = size ** (1 / 3)
+    rotation = linear / scale
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > SKEW:
+        raise ValueError("it stretches the object")
+    centre = linear @ lifted.centre + motion[:3, 3]
+    if centre[2] <= 0:
+        raise ValueError("the object would be behind the camera")
+    return with_centre(Placement(turn=turn_of(rotation), scale=scale), centre, lifted, camera)
 
 
 FOOT = 0.04  # x the object's height, from its lowest point: what touches the ground

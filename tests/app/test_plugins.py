@@ -1,13 +1,16 @@
 """Doors to other programs: the window sends layers back; Krita and ComfyUI's nodes take them.
 
-Krita is the real one. ComfyUI hands its nodes tensors, which is done here. GIMP 3 is in no
-distribution that these tests run on: its plug-in runs against a stand-in for what it calls.
+Krita and Blender (as the package bpy) are the real ones. ComfyUI hands its nodes tensors, which is
+done here. GIMP 3 is in no distribution that these tests run on, and Photoshop on no system: their
+plug-ins run against a stand-in for what they call.
 """
 
 from __future__ import annotations
 
+import base64
 import importlib.util
 import io
+import json
 import os
 import shutil
 import subprocess
@@ -20,12 +23,18 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from psd_tools import PSDImage
 
 from editor_steps import CENTRE, HEIGHT, WIDTH
 from gimp_stub import make_gimp
 from hands import ROOT, opened
 from objectmorpher.__main__ import main
 from objectmorpher.cli.plugin import HOSTS, plugin_files
+from objectmorpher.server.web import WebServer
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.session.file import load_session
 from test_window import screen_xy
 
 PLUGINS = ROOT / "assets" / "plugins"
@@ -157,6 +166,115 @@ def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     assert np.abs(image.shown()[..., :3].astype(int) - pixels(edited / "edited.png")).max() <= 2
     refused = plugin.edit(gimp.Procedure(), None, image, [], None, None)
     assert refused[0] == gimp.PDBStatusType.EXECUTION_ERROR
+
+
+IN_BLENDER = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import bpy
+from bpy_extras.object_utils import world_to_camera_view
+bpy.ops.wm.read_factory_settings(use_empty=True)
+import objectmorpher
+objectmorpher.register()
+assert bpy.ops.import_scene.objectmorpher(filepath="bent.omorph") == {"FINISHED"}
+scene = bpy.context.scene
+bpy.context.view_layer.update()
+(collection,) = [c for c in bpy.data.collections if "objectmorpher" in c]
+pin, handle = sorted((o for o in collection.objects if o.type == "EMPTY"),
+                     key=lambda o: o.empty_display_type)
+for empty in (pin, handle):
+    at = world_to_camera_view(scene, scene.camera, empty.location)
+    print(at.x * 640, (1 - at.y) * 427)
+handle.location.x -= 0.1
+bpy.context.view_layer.update()
+assert bpy.ops.objectmorpher.bend() == {"FINISHED"}
+assert bpy.ops.export_scene.objectmorpher(filepath="moved.omorph") == {"FINISHED"}
+(mesh,) = [o for o in collection.objects if o.type == "MESH"]
+print(len(mesh.data.vertices), handle.location.x)
+"""
+
+
+@pytest.mark.slow
+def test_blender_shows_a_sessions_handles_and_bends_its_object(tmp_path: Path) -> None:
+    blender = os.environ.get("BLENDER_PYTHON")
+    if blender is None:
+        pytest.skip("BLENDER_PYTHON names no Python that has Blender (package bpy)")
+    session = tmp_path / "bent.omorph"
+    told = ["--subject", "--handle", "384,192:420,170", "--pin", "300,300"]
+    told += ["-o", str(tmp_path / "bent.png"), "--session", str(session)]
+    assert main(["edit", str(FLOWER), *told]) == 0
+    assert main(["plugin", "blender", "--folder", str(tmp_path)]) == 0
+    (tmp_path / "driver.py").write_text(IN_BLENDER)
+    command = [blender, "driver.py", str(tmp_path)]
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'app'}{os.pathsep}{ROOT}"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    said = [line for line in done.stdout.splitlines() if line[:1].isdigit() and "|" not in line]
+    assert done.returncode == 0 and len(said) == 3, done.stdout + done.stderr
+    pin, handle, (vertices, x) = ([float(word) for word in line.split()] for line in said)
+    np.testing.assert_allclose([pin, handle], [(300, 300), (420, 170)], atol=0.05)
+    before, after = (load_session(tmp_path / name) for name in ("bent.omorph", "moved.omorph"))
+    targets = [document.objects[0].handles for document in (before, after)]
+    shift = targets[1][1].target - targets[0][1].target
+    lifted = before.objects[0].lifted
+    assert lifted is not None
+    motion = lifted.world_from_object[:3, :3]
+    np.testing.assert_allclose(motion @ shift, (-0.1, 0, 0), atol=1e-5)
+    np.testing.assert_allclose(targets[1][0].target, targets[0][0].target, atol=1e-6)
+    assert vertices > 1000 and 0 < x < 0.3
+    assert (pixels(tmp_path / "moved.png") != pixels(tmp_path / "bent.png")).mean() > 0.01
+
+
+@pytest.mark.slow
+def test_photoshops_panel_sends_a_layer_and_takes_what_comes_back(tmp_path: Path) -> None:
+    node = shutil.which("node")
+    if node is None or int(subprocess.check_output([node, "--version"]).split(b".")[0][1:]) < 18:
+        pytest.skip("needs Node.js 18 or newer")
+    photo = Image.open(FLOWER).convert("RGBA")
+    photo.save(tmp_path / "layer.png")
+    assert main(["plugin", "photoshop", "--folder", str(tmp_path)]) == 0
+    panel = tmp_path / "objectmorpher" / "main.js"
+    panel.write_text(panel.read_text().replace(":8717", r":\d+"))  # any free port
+    token = "a-token-of-this-test-only"
+    server = WebServer(("127.0.0.1", 0), token, 1 << 24)
+    server.start()
+    try:
+        stub = Path(__file__).with_name("photoshop_stub.js")
+        command = [node, str(stub), str(panel), str(tmp_path), f"{server.url}/#token={token}"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            link = process.stdout.readline().strip()
+            name = link.rpartition("edit=")[2]
+            edit = server.find(name)  # what a user would do in the browser
+            edit.select({"click": [[310, 230]]}, silent)
+            edit.lift({}, silent)
+            assert edit.lifted is not None
+            edit.render(shown_pose(edit.lifted, yaw=20) | {"what": "layers"}, silent)
+            told = json.loads(process.stdout.read())
+    finally:
+        server.close()
+    assert link.startswith(f"{server.url}/#token={token}&edit=")
+    assert told["layers"] == ["Above", ["ObjectMorpher", "Object", "Background"], "Mine"]
+    assert told["open"] == 1 and "group above" in told["said"]
+    back = PSDImage.open(tmp_path / "back.psd")
+    assert next(iter(back)).name.startswith("Photo") and "Object 1" in {
+        x.name for x in back.descendants()
+    }
+    merged = np.asarray(back.composite().convert("RGB")).astype(int)
+    assert (np.abs(merged - np.asarray(photo.convert("RGB"))).max(2) > 30).mean() > 0.02
+
+
+def shown_pose(document: Document, yaw: float) -> dict[str, Any]:
+    """What the page in the browser says of an object that was turned."""
+    item, camera = document.objects[0], document.photo.camera
+    assert item.lifted is not None
+    rest = puppet_of(item, camera).deformer.points.astype("<f4")
+    quats = np.tile(np.array([1, 0, 0, 0], "<f4"), (len(rest), 1))
+    world = Placement(turn=(yaw, 0, 0)).matrix(item.lifted, camera) @ item.lifted.world_from_object
+    return {
+        "points": base64.b64encode(rest.tobytes()).decode(),
+        "quats": base64.b64encode(quats.tobytes()).decode(),
+        "turn": world[:3, :3].ravel().tolist(), "shift": world[:3, 3].tolist(),
+    }  # fmt: skip
 
 
 @pytest.mark.slow

@@ -205,22 +205,36 @@ def run_select(options: argparse.Namespace) -> None:
 
 def run_replay(options: argparse.Namespace) -> None:
     """`objectmorpher replay`"""
-    from objectmorpher_core.session.file import load_session
+    from objectmorpher_core.scripting.handle_file import encode_handles, with_handles
+    from objectmorpher_core.session.file import encode_session, load_session
 
     wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
-    if options.report:
-        wanted[options.report] = (".json",)
+    extras: dict[Path | None, tuple[str, ...]] = {
+        options.report: (".json",), options.save_handles: (".json",),
+        options.save_mesh: OUTPUTS["mesh"], options.save_session: (".omorph",),
+    }  # fmt: skip
+    wanted |= {path: endings for path, endings in extras.items() if path is not None}
     video, clip = options.save_video, Clip(options.video, options.seconds)
     if video and _is_folder("save_video", video):
         _check_folder(video)
     elif video:
         wanted[video] = _endings("video")
-    check_outputs([options.session], wanted)
+    inputs = [options.session, *([options.handles] if options.handles else [])]
+    check_outputs(inputs, wanted)
     with progress_bar("Opening") as progress:
-        edited = replay(load_session(options.session), progress)
+        document = load_session(options.session)
+        if options.handles:
+            document = with_handles(document, read_input(options.handles))
+        edited = replay(document, progress)
         outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
         if video:
             outputs |= _encoded("save_video", edited, video, clip)
+        if options.save_handles:
+            outputs[options.save_handles] = encode_handles(edited.document)
+        if options.save_mesh:
+            outputs[options.save_mesh] = encode_output("mesh", edited, options.save_mesh)
+        if options.save_session:
+            outputs[options.save_session] = encode_session(edited.document)
         if options.report:
             outputs[options.report] = json_bytes(edited.report())
     write_all(outputs)

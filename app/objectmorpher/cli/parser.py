@@ -316,6 +316,11 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("session", type=Path, metavar="SESSION", help="an .omorph file")
     add("-o", "--out", type=Path, metavar="OUT", required=True, help="the edited photo")
+    add("--handles", type=Path, metavar="H.json",
+        help="move the handles to where this file has them")  # fmt: skip
+    add("--save-handles", type=Path, metavar="H.json", help="the handles' places, to be moved")
+    add("--save-mesh", type=Path, metavar="M.glb", help="the first object, as it is posed")
+    add("--save-session", type=Path, metavar="S.omorph", help="the edit with the handles moved")
     _add_video(add)
     add(
         "--report",

@@ -13,13 +13,21 @@ from objectmorpher_core.base.files import write_all
 from ..system.resources import resource
 from .terminal import UsageError
 
-HOSTS = ("krita", "gimp", "comfyui")
+HOSTS = ("krita", "gimp", "blender", "photoshop", "comfyui")
 NEXT = {
     "krita": "restart Krita, switch it on in Settings, Configure Krita, Python Plugin Manager, and"
     " restart once more; it is in Tools, Scripts",
     "gimp": "restart GIMP 3; it is in Filters, Edit in 3D with ObjectMorpher",
+    "blender": "restart Blender 4.2 or newer, and switch it on in Edit, Preferences, Add-ons; it is"
+    " in File, Import",
+    "photoshop": "start `objectmorpher serve --web`, add this folder in Adobe's UXP Developer Tool,"
+    " and load it; the panel is in Plugins",
     "comfyui": "restart ComfyUI; the nodes are under ObjectMorpher",
 }
+FOLDERS = {
+    "comfyui": "PATH/TO/ComfyUI/custom_nodes", "photoshop": "FOLDER, where the panel is to lie",
+    "blender": "PATH/TO/blender/VERSION/extensions/user_default",
+}  # fmt: skip
 EXECUTABLE = 0o755
 
 
@@ -28,7 +36,7 @@ def add_plugin(parser: argparse.ArgumentParser) -> None:
     parser.description = "Puts the plug-in where the other program looks for it (docs/plugins.md)."
     parser.add_argument("host", choices=HOSTS, metavar="HOST", help=", ".join(HOSTS))
     parser.add_argument("--folder", type=Path, metavar="FOLDER",
-        help="of its plug-ins; default for krita and gimp: the user's own")  # fmt: skip
+        help="of its plug-ins; default for krita, gimp and blender: the user's own")  # fmt: skip
 
 
 def run_plugin(options: argparse.Namespace) -> None:
@@ -36,7 +44,7 @@ def run_plugin(options: argparse.Namespace) -> None:
     host: str = options.host
     folder = options.folder or usual_folder(host)
     if folder is None:
-        raise UsageError("which folder? add --folder PATH/TO/ComfyUI/custom_nodes")
+        raise UsageError(f"which folder? add --folder {FOLDERS[host]}")
     if options.folder is not None and not folder.is_dir():
         raise UsageError(f"there is no folder {folder}")
     files = plugin_files(host)
@@ -59,7 +67,7 @@ def plugin_files(host: str) -> dict[str, bytes]:
         if path.is_file() and "__pycache__" not in path.parts
     }
     frozen = getattr(sys, "frozen", False)
-    command = [sys.executable] if frozen else [sys.executable, "-m", "objectmorpher"]
+    command = [sys.executable] if frozen else [sys.executable, "-P", "-m", "objectmorpher"]
     files["objectmorpher/door.py"] = (source / "door.py").read_bytes()
     files["objectmorpher/objectmorpher.json"] = json.dumps({"command": command}).encode()
     return files
@@ -75,5 +83,12 @@ def usual_folder(host: str) -> Path | None:
     else:
         data = Path(os.environ.get("XDG_DATA_HOME") or home / ".local" / "share")
         config = Path(os.environ.get("XDG_CONFIG_HOME") or home / ".config")
+    blenders = sorted((config / "blender").glob("*.*"), key=_version)
+    if host == "blender" and blenders:
+        return blenders[-1] / "extensions" / "user_default"
     folders = {"krita": data / "krita" / "pykrita", "gimp": config / "GIMP" / "3.0" / "plug-ins"}
     return folders.get(host)
+
+
+def _version(folder: Path) -> tuple[int, ...]:
+    return tuple(int(part) for part in folder.name.split(".") if part.isdigit())

@@ -8,12 +8,17 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from .terminal import UsageError
+
+if TYPE_CHECKING:
+    from ..server.front import HttpServer
 
 
 def add_serve(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +35,8 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
     add("--port", type=int, default=PORT, metavar="P", help=f"default {PORT}; 0: any free one")
     add("--token-file", type=Path, metavar="FILE", help="holds the token; created if missing")
     add("--max-body", type=int, default=512, metavar="MB", help="largest request, default 512")
+    add("--web", action="store_true",
+        help="the editor itself, in a browser; computed in this process")  # fmt: skip
     add = parser.add_argument_group("who computes").add_argument
     add("--alone", action="store_true",
         help="in this process, one job at a time, without Ray")  # fmt: skip
@@ -52,13 +59,15 @@ def run_serve(options: argparse.Namespace) -> None:
     from ..system.logs import show_log
     from ..worker.stages import STAGES
 
+    if options.web:
+        _run_web(options)
+        return
     stages = tuple(options.stages.split(",")) if options.stages else STAGES
     unknown = [stage for stage in stages if stage not in STAGES]
     if unknown:
         raise UsageError(f"there is no stage {unknown[0]!r}; there are {', '.join(STAGES)}")
     least, most = _range(options.replicas)
-    if options.max_body < 1 or not 0 <= options.port < 65536 or not 0 < options.cpus < math.inf:
-        raise UsageError("--max-body and --cpus are numbers above zero, --port is below 65536")
+    _check_address(options)
     if options.gpus is not None and not 0 <= options.gpus < math.inf:
         raise UsageError("--gpus is a number of GPUs, or a share of one")
     if options.store is not None and options.store < 1:
@@ -70,24 +79,59 @@ def run_serve(options: argparse.Namespace) -> None:
     plan = ClusterPlan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
     show_log()
     served = {name: row for name, row in table().items() if row.stage in stages}
+    runner = Alone(stages) if options.alone else Cluster(plan)
+    try:
+        limits = RequestLimits(body=options.max_body << 20)
+        front = Front((options.host, options.port), token, runner, served, limits)
+        with _served(front):  # Ray sets handlers of signals when it starts, and has done so
+            _greet(front.url, token if is_new else None, options)
+    finally:
+        runner.close()
+
+
+OF_CLUSTERS = ("ray", "stages", "gpus", "store")
+
+
+def _run_web(options: argparse.Namespace) -> None:
+    """Serves the editor to browsers until it is interrupted or ended."""
+    from ..server.web import WebServer
+    from ..system.logs import show_log
+
+    meant = [name for name in OF_CLUSTERS if getattr(options, name) is not None]
+    if meant or options.replicas != "1":
+        raise UsageError(f"--web computes in this process: leave out --{(*meant, 'replicas')[0]}")
+    _check_address(options)
+    token, is_new = _token(options.token_file)
+    show_log()
+    server = WebServer((options.host, options.port), token, options.max_body << 20)
+    with _served(server):
+        _greet(server.url, token if is_new else None, options)
+        sys.stdout.write(
+            f"open {server.url}/#token={token}\n" if is_new else f"open {server.url}\n"
+        )
+        sys.stdout.flush()
+
+
+def _check_address(options: argparse.Namespace) -> None:
+    if options.max_body < 1 or not 0 <= options.port < 65536 or not 0 < options.cpus < math.inf:
+        raise UsageError("--max-body and --cpus are numbers above zero, --port is below 65536")
+
+
+@contextmanager
+def _served(server: HttpServer) -> Iterator[None]:
+    """Serve after the body has run, until the process is asked to end."""
     stop = threading.Event()
 
     def end(number: int, frame: FrameType | None) -> None:
         stop.set()
 
-    runner = Alone(stages) if options.alone else Cluster(plan)
-    signal.signal(signal.SIGTERM, end)  # only now: Ray sets its own when it starts
+    signal.signal(signal.SIGTERM, end)
+    server.start()
     try:
-        limits = RequestLimits(body=options.max_body << 20)
-        front = Front((options.host, options.port), token, runner, served, limits)
-        front.start()
-        try:
-            _greet(front.url, token if is_new else None, options)
-            stop.wait()
-        finally:
-            front.close()
+        yield
+        stop.wait()
     finally:
-        runner.close()
+        server.close()
 
 
 def _greet(url: str, token: str | None, options: argparse.Namespace) -> None:

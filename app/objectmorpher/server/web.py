@@ -1,0 +1,402 @@
+"""The editor in a browser: what `objectmorpher serve --web` answers.
+
+    GET  /  /web.js                      the page
+    GET  /web/about                      {"samples": names of photos, "most": bytes of a photo}
+    GET  /web/samples/NAME               a sample photo
+    POST /web/edits                      a photo's bytes -> {"id", "size"}
+    POST /web/edits/ID/select            {"click": [[x, y]], "not_click": [...], "subject": bool}
+    POST /web/edits/ID/lift              {}
+    POST /web/edits/ID/render            {"what": one of FILES, "points", "quats", "turn", "shift"}:
+                                         the state of the page of `objectmorpher share`
+    GET  /web/edits/ID/about             {"id", "size"}
+    GET  /web/edits/ID/photo|mask|page   pictures, and that page
+    GET  /web/edits/ID/files/WHAT        what was rendered last
+
+The last three POST answer with lines of JSON: progress, and at the end {"state": "done"} or a
+sentence in "error". Everything of an edit needs the token; one computation runs at a time.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import logging
+import secrets
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any, ClassVar
+from urllib.parse import quote, unquote
+
+import numpy as np
+
+from objectmorpher_core import pipeline, segment
+from objectmorpher_core.base.limits import CONNECTIONS
+from objectmorpher_core.base.progress import Cancelled, Progress, part
+from objectmorpher_core.base.rotations import matrices_from_quats
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Click, Document, Pose, Prompt
+from objectmorpher_core.document.placement import placement_of
+from objectmorpher_core.pictures.image import (
+    Picture,
+    at_most,
+    encode_coverage,
+    encode_picture,
+    resized,
+    to_u8,
+)
+from objectmorpher_core.scripting.outputs import encode_output
+from objectmorpher_core.scripting.runner import has_left, with_plate
+from objectmorpher_core.scripting.script import EditScript
+from objectmorpher_core.session.file import encode_session
+
+from ..system.resources import resource
+from .address import check_token, is_same
+from .front import Handler, HttpServer, Refusal
+from .page import LONGEST, encode_page
+
+log = logging.getLogger(__name__)
+
+MOST_EDITS = 6  # kept at a time; the least recently used goes first
+MOST_SAID = 1 << 20  # bytes of a question that is no photo
+MOST_CLICKS = 64
+BEAT = 0.2  # s between two lines of a computation
+QUALITY = 90  # of the WebP that the page shows while one selects
+FILES = ("photo", "session", "layers")
+KEPT_ENDINGS = (".jpg", ".jpeg", ".png")  # a photo is given back as what it came; else PNG
+# The page runs the page of `share` in a frame of its own, which brings its programs along.
+POLICY = (
+    "default-src 'none'; img-src 'self' data: blob:; style-src 'unsafe-inline'; connect-src 'self';"
+    " script-src 'self' 'unsafe-inline' blob:; worker-src blob:; frame-src blob:; base-uri 'none';"
+    " form-action 'none'; frame-ancestors 'none'"
+)
+
+
+class EditError(ValueError):
+    """A question that makes no sense at this point of an edit; one sentence."""
+
+
+@dataclass(eq=False)
+class WebEdit:
+    """A photo that somebody edits in a browser, as far as they have come."""
+
+    opened: Document
+    reading: pipeline.Reading | None = None
+    chosen: Document | None = None
+    lifted: Document | None = None
+    files: dict[str, tuple[str, bytes]] = field(default_factory=dict)  # what is to be saved
+    lock: threading.Lock = field(default_factory=threading.Lock)  # one question at a time
+
+    @property
+    def name(self) -> str:
+        """Name of the photo's file, without folders."""
+        return Path(self.opened.photo.name).name
+
+    def select(self, asked: Mapping[str, Any], progress: Progress) -> None:
+        """Choose the object that the clicks mean, px of the photo."""
+        wanted = Prompt(
+            tuple(
+                Click(x, y, is_foreground=is_meant)
+                for name, is_meant in (("click", True), ("not_click", False))
+                for x, y in _points(asked.get(name, []), self.opened.photo.size)
+            ),
+            is_subject=asked.get("subject") is True,
+        )
+        if wanted.is_empty:
+            raise EditError("click the object first")
+        if self.reading is None:
+            read = part(progress, 0.0, 0.8)
+            self.reading = pipeline.read_photo(self.opened.photo.pixels, segment.load(), read)
+        found = self.reading.segment(wanted, part(progress, 0.8, 1.0), self.opened.seed)
+        document = edits.set_mask(edits.add_object(self.opened), 0, found.mask, wanted)
+        self.chosen = document.with_backend("segment", found.backend)
+        self.lifted = None
+
+    def lift(self, asked: Mapping[str, Any], progress: Progress) -> None:
+        """Lift the chosen object to 3D and fill in what is behind it."""
+        document = self._chosen()
+        photo, item = document.photo, document.objects[0]
+        assert item.selection is not None, "it was chosen"
+        made = pipeline.lift_mask(
+            photo.pixels, photo.camera, item.selection,
+            progress=part(progress, 0.0, 0.5), seed=document.seed,
+        )  # fmt: skip
+        document = edits.set_lifted(document, 0, *made)
+        behind = part(progress, 0.5, 1.0)
+        self.lifted = with_plate(document, EditScript(), frozenset(), behind).document
+
+    def render(self, asked: Mapping[str, Any], progress: Progress) -> None:
+        """Make the file that is to be saved, of the object as the page shows it."""
+        document = posed_as_shown(self._lifted(), asked)
+        what = asked.get("what")
+        if what not in FILES:
+            raise EditError(f"what is to be made is one of {', '.join(FILES)}")
+        stem, ending = Path(self.name).stem or "photo", Path(self.name).suffix.lower()
+        if has_left(document.objects[0]):  # its shadow in the photo goes along
+            step = part(progress, 0.0, 0.6)
+            document = with_plate(document, EditScript(), frozenset({0}), step).document
+        if what == "session":
+            self.files[what] = f"{stem}.omorph", encode_session(document)
+            return
+        edited = pipeline.replay(document, part(progress, 0.6, 1.0))
+        usual = ending if ending in KEPT_ENDINGS else ".png"
+        name = f"{stem} edited{'.psd' if what == 'layers' else usual}"
+        self.files[what] = name, encode_output(what, edited, Path(name))
+
+    def show(self, what: str) -> tuple[bytes, str]:
+        """The bytes of "photo", "mask", "page" or a file, and their media type."""
+        if what == "photo":
+            pixels = at_most(to_u8(self.opened.photo.pixels), LONGEST)
+            return encode_picture(Picture(pixels), ".webp", webp_quality=QUALITY), "image/webp"
+        if what == "mask":
+            mask = self._chosen().objects[0].mask
+            assert mask is not None, "it was chosen"
+            scale = min(LONGEST / max(mask.shape), 1.0)
+            height, width = (max(round(side * scale), 1) for side in mask.shape)
+            return encode_coverage(resized(mask.astype(np.uint8) * 255, width, height)), "image/png"
+        if what == "page":
+            return encode_page(self._lifted(), 0), "text/html; charset=utf-8"
+        made = self.files.get(what.removeprefix("files/"))
+        if made is None:
+            raise EditError("there is nothing of that name")
+        return made[1], "application/octet-stream"
+
+    def _chosen(self) -> Document:
+        if self.chosen is None:
+            raise EditError("click the object first")
+        return self.chosen
+
+    def _lifted(self) -> Document:
+        if self.lifted is None:
+            raise EditError("the object is not lifted yet")
+        return self.lifted
+
+
+def posed_as_shown(document: Document, shown: Mapping[str, Any]) -> Document:
+    """Return the document with its first object posed and placed as the page shows it.
+
+    `shown` holds "points" (M, 3) and "quats" (M, 4) in wxyz of the control points, object frame,
+    little-endian float32 in Base64, and "turn" (3, 3) and "shift" (3,), the motion of the object
+    frame into the world. Raises EditError.
+    """
+    item, camera = document.objects[0], document.photo.camera
+    lifted = item.lifted
+    assert lifted is not None, "the caller checks"
+    count = pipeline.puppet_of(item, camera).deformer.points.shape[0]
+    points, quats = _floats(shown, "points", (count, 3)), _floats(shown, "quats", (count, 4))
+    lengths = np.linalg.norm(quats, axis=1, keepdims=True)
+    if lengths.min() < 0.5:
+        raise EditError("the turns of a pose are unit quaternions")
+    try:
+        motion = np.eye(4)
+        motion[:3, :3] = np.array(shown["turn"], np.float64).reshape(3, 3)
+        motion[:3, 3] = np.array(shown["shift"], np.float64).reshape(3)
+        place = placement_of(motion @ np.linalg.inv(lifted.world_from_object), lifted, camera)
+    except (KeyError, TypeError, ValueError) as error:
+        raise EditError(f"that is no place of an object: {error}") from error
+    pose = Pose(points, matrices_from_quats(quats / lengths))
+    return edits.set_placement(edits.set_pose(document, 0, pose), 0, place)
+
+
+def _floats(shown: Mapping[str, Any], name: str, shape: tuple[int, int]) -> np.ndarray:
+    try:
+        values = np.frombuffer(base64.b64decode(shown[name], validate=True), "<f4").reshape(shape)
+    except (KeyError, TypeError, ValueError, binascii.Error):
+        raise EditError(f"{name} must be {shape[0]} x {shape[1]} numbers in Base64") from None
+    if not np.isfinite(values).all() or np.abs(values).max() > 1e6:
+        raise EditError(f"{name} must be finite numbers below a million")
+    return values.astype(np.float64)
+
+
+def _points(said: Any, size: tuple[int, int]) -> list[tuple[float, float]]:
+    try:
+        points = np.array(said, np.float64).reshape(-1, 2)
+    except (TypeError, ValueError):
+        raise EditError("clicks are pairs of numbers") from None
+    if len(points) > MOST_CLICKS:
+        raise EditError(f"at most {MOST_CLICKS} clicks are taken")
+    if not ((points >= 0) & (points <= size)).all():
+        raise EditError("a click is inside the photo")
+    return [(float(x), float(y)) for x, y in points]
+
+
+class WebServer(HttpServer):
+    """Serves the editor to the browsers of whoever has the token."""
+
+    def __init__(
+        self, address: tuple[str, int], token: str, most: int, connections: int = CONNECTIONS
+    ) -> None:
+        """`most`: bytes of a photo. Raises OSError where the address is taken, TokenError."""
+        self.token, self.most = check_token(token), most
+        self.edits: OrderedDict[str, WebEdit] = OrderedDict()
+        self.edits_lock = threading.Lock()
+        self.turn = threading.Lock()  # of the one computation that runs
+        self.samples = {p.name: p for p in sorted(resource("assets/samples").glob("*.jpg"))}
+        super().__init__(address, partial(_WebHandler, self), connections)
+
+    def add(self, edit: WebEdit) -> str:
+        """Keep an edit, and return the name that only its owner knows."""
+        name = secrets.token_urlsafe(16)
+        with self.edits_lock:
+            self.edits[name] = edit
+            while len(self.edits) > MOST_EDITS:
+                self.edits.popitem(last=False)
+        return name
+
+    def find(self, name: str) -> WebEdit:
+        """Return the edit of that name. Raises Refusal."""
+        with self.edits_lock:
+            edit = self.edits.get(name)
+            if edit is None:
+                raise Refusal(
+                    HTTPStatus.GONE, "this edit is not kept any more: open the photo again"
+                )
+            self.edits.move_to_end(name)
+        return edit
+
+
+PAGE = {
+    "/": ("page.html", "text/html; charset=utf-8"),
+    "/web.js": ("web.js", "text/javascript; charset=utf-8"),
+}
+
+
+class _WebHandler(Handler):
+    more_headers: ClassVar = {
+        "Content-Security-Policy": POLICY,
+        "Referrer-Policy": "no-referrer",
+        "Cross-Origin-Resource-Policy": "same-origin",
+        "X-Accel-Buffering": "no",  # nginx hands each line on at once
+    }
+
+    def __init__(self, server: WebServer, *connection: Any) -> None:
+        self.web = server
+        super().__init__(*connection)
+
+    def do_GET(self) -> None:
+        self.answer(self._get)
+
+    def do_POST(self) -> None:
+        self.answer(self._post)
+
+    def admit(self) -> None:
+        """Refuse everything but the page itself to whoever has not the token."""
+        if self.command == "GET" and self.path in PAGE:
+            return
+        scheme, _, token = self.headers.get("Authorization", "").partition(" ")
+        if scheme != "Bearer" or not is_same(token.strip(), self.web.token):
+            raise Refusal(HTTPStatus.UNAUTHORIZED, "the token is missing or wrong")
+
+    def _get(self) -> None:
+        if self.path in PAGE:
+            name, kind = PAGE[self.path]
+            self.send_bytes(HTTPStatus.OK, resource(f"assets/web/{name}").read_bytes(), kind)
+            return
+        if self.path == "/web/about":
+            about = {"samples": list(self.web.samples), "most": self.web.most}
+            self.send_json(HTTPStatus.OK, about)
+            return
+        folder, _, name = self.path.rpartition("/")
+        if folder == "/web/samples" and name in self.web.samples:
+            self.send_bytes(HTTPStatus.OK, self.web.samples[name].read_bytes(), "image/jpeg")
+            return
+        edit, name, what = self._meant()
+        if what == "about":
+            self.send_json(HTTPStatus.OK, {"id": name, "size": edit.opened.photo.size})
+            return
+        try:
+            body, kind = edit.show(what)
+        except EditError as error:
+            raise Refusal(HTTPStatus.NOT_FOUND, str(error)) from error
+        headers = {"Content-Length": str(len(body)), "Cache-Control": "no-store"}
+        if what.startswith("files/"):
+            name = quote(edit.files[what.removeprefix("files/")][0])
+            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{name}"
+        self.send_head(HTTPStatus.OK, kind, headers)
+        self.wfile.write(body)
+
+    def _post(self) -> None:
+        if self.path == "/web/edits":
+            self._open()
+            return
+        edit, _, what = self._meant()
+        works: dict[str, Callable[[Mapping[str, Any], Progress], None]] = {
+            "select": edit.select, "lift": edit.lift, "render": edit.render,
+        }  # fmt: skip
+        work = works.get(what)
+        if work is None:
+            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+        try:
+            asked = json.loads(self.read_body(MOST_SAID))
+        except ValueError:
+            asked = None
+        if not isinstance(asked, dict):
+            raise Refusal(HTTPStatus.BAD_REQUEST, "a question is one object of JSON")
+        self._carry_out(partial(work, asked), edit.lock)
+
+    def _open(self) -> None:
+        name = Path(unquote(self.headers.get("X-Name", "photo"))).name[:200] or "photo"
+        try:
+            opened = pipeline.open_photo(self.read_body(self.web.most), name)
+        except ValueError as error:
+            raise Refusal(HTTPStatus.BAD_REQUEST, str(error)) from error
+        self.send_json(HTTPStatus.OK, {
+            "id": self.web.add(WebEdit(opened)), "size": opened.photo.size,
+        })  # fmt: skip
+
+    def _meant(self) -> tuple[WebEdit, str, str]:
+        """The edit, its name, and what of it is meant. Raises Refusal."""
+        start, _, rest = self.path.partition("/web/edits/")
+        name, _, what = rest.partition("/")
+        if start or not what:
+            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+        return self.web.find(name), name, what
+
+    def _carry_out(self, work: Callable[[Progress], None], lock: threading.Lock) -> None:
+        """Answer with the progress of `work`, line by line, once it is its turn."""
+        self.send_head(HTTPStatus.OK, "application/x-ndjson", {"Cache-Control": "no-store"})
+        try:
+            with self._held(lock), self._held(self.web.turn):
+                work(self._teller())
+            self._line({"state": "done"})
+        except (Cancelled, OSError):
+            log.info("Nobody listens any more")
+        except ValueError as error:
+            self._line({"state": "failed", "error": str(error)})
+        except Exception:
+            log.exception("A computation failed")
+            self._line({"state": "failed", "error": "the computer that serves this has failed"})
+
+    @contextmanager
+    def _held(self, lock: threading.Lock) -> Iterator[None]:
+        """Hold `lock` once it is free. Raises OSError where nobody waits for it any more."""
+        while not lock.acquire(timeout=BEAT):
+            self._line({"state": "waiting"})
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def _teller(self) -> Progress:
+        last = 0.0
+
+        def tell(fraction: float, note: str) -> None:
+            nonlocal last
+            if self.web.is_closing.is_set():
+                raise Cancelled
+            if time.monotonic() - last < BEAT:
+                return
+            last = time.monotonic()
+            self._line({"state": "running", "fraction": fraction, "note": note})
+
+        return tell
+
+    def _line(self, value: Any) -> None:
+        self.wfile.write(json.dumps(value).encode() + b"\n")
