@@ -22,7 +22,7 @@ RESEARCH = ROOT / "research" / "objectmorpher_research"
 ONNX = CORE / "models" / "onnx_session.py"  # imports onnxruntime, with its telemetry off
 NETWORKS = {  # classes of PyTorch's; what is imported first needs none
     CORE / "lift" / "trellis",
-    CORE / "compose" / "plate" / "pixelhacker",
+    CORE / "compose" / "plate" / "pixelhacker.py",
 }
 WINDOW = {"imgui_bundle", "imgui", "glfw", "OpenGL"}
 GL = {"moderngl", "glcontext"}
@@ -44,8 +44,9 @@ import bundled  # noqa: E402
 MOST_RATIO = 7.0  # it is about 4.5; scipy alone would add 2, torch 20
 
 
-def sources(*folders: Path) -> list[Path]:
-    return [path for folder in folders for path in sorted(folder.rglob("*.py"))]
+def sources(*places: Path) -> list[Path]:
+    """The files themselves, and those in the folders."""
+    return [f for p in places for f in ([p] if p.is_file() else sorted(p.rglob("*.py")))]
 
 
 @cache
