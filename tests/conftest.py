@@ -9,13 +9,16 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: ARCHITECTURE section 8
 
+from objectmorpher_core.base.progress import silent
 from tests import photos
 
 
@@ -30,40 +33,61 @@ def _photo_fixture(name: str):
 chelsea, coffee, astronaut, rocket, flower, china = map(_photo_fixture, photos.NAMES)
 
 
-@pytest.fixture(scope="module")
-def lifted_once() -> Iterator[None]:
-    """For a module: the same object of the same photo is lifted once, and its progress repeated.
+_known: dict[bytes, tuple[Any, ...]] = {}  # what `lifted_once` remembers: see `_remembering`
 
-    What is lifted is immutable, and that two lifts are equal is tested in tests/core/lift.
-    """
-    from objectmorpher_core.lift.relief.lifter import ReliefLifter
 
-    lift, known = ReliefLifter.lift, {}
+def _digest(value: Any) -> bytes:
+    """Tells values apart: arrays by what they hold, objects by their kind and fields."""
+    if isinstance(value, np.ndarray):
+        return repr((value.shape, value.dtype)).encode() + value.tobytes()
+    if hasattr(value, "__dict__") and not callable(value):
+        value = (type(value).__qualname__, *vars(value).values())
+    if isinstance(value, tuple):
+        return b"(" + b",".join(map(_digest, value)) + b")"
+    return repr(value).encode()
 
-    def remembered(self, subject, settings, progress, seed=0):
-        matte = subject.matte
-        arrays = (subject.pixels, subject.mask, matte.alpha, matte.foreground, settings.hidden,
-                  settings.nearness)  # fmt: skip
-        told = repr((matte.box, subject.camera, vars(settings), seed)).encode()
-        digest = hashlib.sha256(told)
-        for array in arrays:
-            digest.update(b"" if array is None else repr(array.shape).encode() + array.tobytes())
-        if (key := digest.digest()) in known:
-            lifted, steps = known[key]
-            for step in steps:
-                progress(*step)
-            return lifted
-        steps = []
+
+def _remembering(function: Callable[..., Any]) -> Callable[..., Any]:
+    """`function`, computed once for the same arguments; its progress is repeated."""
+
+    def remembered(*arguments: Any) -> Any:
+        steps: list[tuple[float, str]] = []
 
         def note(fraction: float, text: str) -> None:
             steps.append((fraction, text))
             progress(fraction, text)
 
-        known[key] = lift(self, subject, settings, note, seed), steps
-        return known[key][0]
+        progress = next((a for a in arguments if callable(a)), silent)
+        said = _digest((function.__qualname__, *(a for a in arguments if not callable(a))))
+        key = hashlib.sha256(said).digest()
+        if key in _known:
+            for step in _known[key][1]:
+                progress(*step)
+        else:  # the arguments stay alive: addresses in the digest are nobody else's
+            found = function(*(note if callable(a) else a for a in arguments))
+            _known[key] = found, steps, arguments
+        return _known[key][0]
+
+    return remembered
+
+
+@pytest.fixture(scope="module")
+def lifted_once() -> Iterator[None]:
+    """For a module: what is dear about the same object of the same photo is computed once.
+
+    It is the lift, the search for the shadow that it throws, and that for what of it a fill would
+    leave. All are immutable and are remembered for other modules, too. That they are the same each
+    time is tested in tests/core/lift, and in the slow stage by processes of their own.
+    """
+    from objectmorpher_core.compose.plate import plate
+    from objectmorpher_core.lift.relief.lifter import ReliefLifter
+    from objectmorpher_core.scripting import runner
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ReliefLifter, "lift", remembered)
+        for owner, name in (
+            (ReliefLifter, "lift"), (plate, "find_residue"), (runner, "find_old_shadow"),
+        ):  # fmt: skip
+            patch.setattr(owner, name, _remembering(getattr(owner, name)))
         yield
 
 

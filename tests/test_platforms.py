@@ -51,14 +51,14 @@ sys.platform = "win32"
 for path in sys.argv[4:]:
     importlib.import_module(path)
 from objectmorpher.cli import parser as cli
-from objectmorpher.system import file_lock
+from objectmorpher.editor import autosave
 from pathlib import Path
 photo, session, out = sys.argv[1:4]
 edit = ["edit", photo, "--click", "280,150", "--turn", "15,0,0", "--session", session, "-o", out]
 assert cli.main(edit + ["--segment", "grabcut"]) == 0
 assert cli.main(["replay", session, "-o", out + ".again.png"]) == 0
 assert Path(out).stat().st_size > 10_000
-lock = file_lock.FileLock.take(Path(out + ".lock"))
+lock = autosave.FileLock.take(Path(out + ".lock"))
 assert lock is not None
 lock.release()
 """
@@ -72,7 +72,7 @@ def test_the_job_is_done_without_what_windows_lacks(tmp_path) -> None:
          "objectmorpher.worker.jobs", "objectmorpher.editor.editor",
          "objectmorpher.editor.recovery",
          "objectmorpher.editor.autosave", "objectmorpher_core.scripting.report",
-         "objectmorpher_core.doctor", "objectmorpher_core.lift.workers.process"],
+         "objectmorpher_core.doctor", "objectmorpher_core.lift.workers.external"],
         cwd=ROOT, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": PYTHONPATH},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]

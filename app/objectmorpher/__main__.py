@@ -86,8 +86,8 @@ def _run_window(options: WindowOptions) -> int:
 
     from .editor.settings import settings_path
     from .gui.window.window import run_window
-    from .system.first_start import start_compiling
     from .system.logs import start_log
+    from .system.warm_up import start_compiling
 
     torch_environment.join()
     start_log(settings_path().parent)

@@ -20,8 +20,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT))
 from objectmorpher_core.base.arrays import F32, F64, Mask  # noqa: E402
-from objectmorpher_core.compose.shadow.shadow_evidence import LIKELY, SURE  # noqa: E402
-from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow  # noqa: E402
+from objectmorpher_core.compose.shadow.shadow_fit import (  # noqa: E402
+    LIKELY,
+    SURE,
+    find_old_shadow,
+)
 from objectmorpher_core.segment.matting.matte import build_matte  # noqa: E402
 from tests.shadow_scenes import Scene, scene  # noqa: E402
 

@@ -30,11 +30,11 @@ from published import (
 
 from objectmorpher_core import models
 from objectmorpher_core.compose.plate import inpaint_pixelhacker
-from objectmorpher_core.compose.plate.pixelhacker import sampler
+from objectmorpher_core.compose.plate import pixelhacker as sampler
 from objectmorpher_core.compose.refine import klein, qwen
 from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
 from objectmorpher_core.lift.trellis import lifter
-from objectmorpher_core.models import depth_torch
+from objectmorpher_core.models import depth_net
 from objectmorpher_core.models.plans import RESIDENT, Need, Network, PipelineNeed, Way
 from objectmorpher_core.segment.sam import sam_torch
 
@@ -133,7 +133,7 @@ def _lifters() -> Iterator[Row]:
             yield Row(tier, count, memory, work, has_cpu=False)
         yield Row("CPU", count, need.bytes("float32", RESIDENT), work, has_gpu=False)
     count, work = _count("depth"), operations(build("depth"), lambda m: m(_photo(518)))
-    need = Need(count, depth_torch.WORK)
+    need = Need(count, depth_net.WORK)
     name = "`depth-anything-v2-small`, for the relief"
     yield Row(f"{name}; GPU or CPU", count, need.bytes("float32"), work)
 

@@ -31,7 +31,7 @@ from published import SAM, SAM2, build, parameters, trellis_parts
 from torch import Tensor
 
 from objectmorpher_core.base.progress import silent
-from objectmorpher_core.compose.plate.pixelhacker import sampler as pixelhacker
+from objectmorpher_core.compose.plate import pixelhacker
 from objectmorpher_core.compose.refine import klein
 from objectmorpher_core.lift.trellis.configs import Sampling
 from objectmorpher_core.lift.trellis.generator import sample

@@ -13,8 +13,8 @@ import transformers
 from torch import Tensor, nn
 from torch.utils.flop_counter import FlopCounterMode
 
-from objectmorpher_core.compose.plate.pixelhacker.network import PUBLISHED
-from objectmorpher_core.compose.plate.pixelhacker.network import build as build_pixelhacker
+from objectmorpher_core.compose.plate.pixelhacker import PUBLISHED
+from objectmorpher_core.compose.plate.pixelhacker import build as build_pixelhacker
 from objectmorpher_core.lift.trellis.parts import build as build_part
 
 d: Any = diffusers  # whose names are lazy

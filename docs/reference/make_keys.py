@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from objectmorpher.commands import GROUPS
-from objectmorpher.commands.gestures import GESTURES
+from objectmorpher.editor.shortcuts import GESTURES
 
 PAGE = Path(__file__).with_name("keys.md")
 HEAD = """# Keys and gestures of the window

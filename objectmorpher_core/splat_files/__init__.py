@@ -20,9 +20,15 @@ from .splats.compressed_ply import (
     is_compressed,
     read_compressed,
 )
-from .splats.ply import decode_ply, encode_ply, is_mere_points, read_ply
-from .splats.ply_table import half_turned, read_header
-from .splats.point_cloud import read_points
+from .splats.ply import (
+    decode_ply,
+    encode_ply,
+    half_turned,
+    is_mere_points,
+    read_header,
+    read_ply,
+    read_points,
+)
 from .splats.splat import decode_splat, encode_splat
 from .splats.spz import decode_spz, encode_spz
 

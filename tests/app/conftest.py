@@ -19,6 +19,7 @@ from editor_steps import lift_ball, made_photo, open_file, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
 from objectmorpher.editor.view import ViewState
+from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.document.model import Document
 
 try:
@@ -61,13 +62,18 @@ def shared_editor(compiled: None, data_folder: None) -> Iterator[Editor]:
 
 
 @pytest.fixture
-def editor(shared_editor: Editor, photo_path: Path) -> Editor:
-    """An editor with the made photo open; the worker is shared, it takes seconds to start."""
+def editor(request: pytest.FixtureRequest, shared_editor: Editor, photo_path: Path) -> Editor:
+    """An editor with the made photo open; the worker is shared, it takes seconds to start.
+
+    A test that has the lifted `ball` opens that: for it nothing is opened, and what the canvas has
+    computed of the ball stays known.
+    """
     shared_editor.close_document()
     wait_until(shared_editor, lambda: shared_editor.jobs.is_idle)
     shared_editor.view = ViewState()  # nothing of it stays from the test before
     shared_editor.view.resize(*CANVAS)
-    open_file(shared_editor, photo_path)
+    if "ball" not in request.fixturenames:
+        open_file(shared_editor, photo_path)
     assert shared_editor.message is None, shared_editor.message
     return shared_editor
 
@@ -101,12 +107,19 @@ def alone(own_settings: Path) -> Iterator[Editor]:
     editor.shut_down()
 
 
+@pytest.fixture(scope="session")
+def desk_jobs() -> Iterator[Jobs]:
+    jobs = Jobs()
+    yield jobs
+    jobs.close()
+
+
 @pytest.fixture
-def desk() -> Iterator[Desk]:
+def desk(desk_jobs: Jobs) -> Iterator[Desk]:
     """A window's jobs and the server that they may go to."""
     from desk import Desk
 
-    desk = Desk()
+    desk = Desk(desk_jobs)
     yield desk
     desk.close()
 

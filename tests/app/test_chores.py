@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from objectmorpher.editor.opening import OpeningError
-from objectmorpher.worker.job_error import JobError
+from objectmorpher.worker.requests import JobError
 from objectmorpher.worker.threads import Chores
 from objectmorpher_core.base.progress import Progress
 

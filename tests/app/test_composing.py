@@ -12,7 +12,7 @@ from objectmorpher.canvas.layers import FRAME
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
-from objectmorpher.tools.compose_tool import ComposeTool
+from objectmorpher.tools.brush_tools import ComposeTool
 from objectmorpher_core.compose.plate.plate import plate_cover, plate_picture
 from objectmorpher_core.compose.shadow.shadow import Shade
 from objectmorpher_core.document import edits

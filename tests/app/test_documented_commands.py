@@ -18,6 +18,8 @@ from objectmorpher_core import pipeline
 from objectmorpher_core.pictures.image import read_picture
 from tests.photos import outlined
 
+pytestmark = pytest.mark.usefixtures("lifted_once")
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "howto").glob("*.md"))]
 RUN = ("edit", "select", "replay", "convert", "batch", "share")

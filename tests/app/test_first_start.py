@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from objectmorpher.system.first_start import mark_compiled, needs_compiling, start_compiling
+from objectmorpher.system.warm_up import mark_compiled, needs_compiling, start_compiling
 from objectmorpher_core.base import installation
 from tests.tree import PYTHONPATH
 

@@ -9,7 +9,7 @@ from editor_steps import wait_for_jobs, wait_until
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Composed, ToolName
-from objectmorpher.tools.compose_tool import ComposeTool
+from objectmorpher.tools.brush_tools import ComposeTool
 from objectmorpher.tools.pointer import Button
 from objectmorpher_core.compose.plate.plate import plate_picture
 from objectmorpher_core.document.model import Document

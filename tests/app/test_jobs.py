@@ -14,8 +14,8 @@ from PIL import UnidentifiedImageError
 
 import job_functions
 from objectmorpher.editor.opening import OpeningError
-from objectmorpher.worker.job_error import JobError
 from objectmorpher.worker.jobs import Jobs
+from objectmorpher.worker.requests import JobError
 
 
 class Log:
@@ -164,7 +164,7 @@ def test_the_log_tells_the_programs_failures_from_the_requests(
     worker: Jobs, caplog: pytest.LogCaptureFixture
 ) -> None:
     log = Log()
-    with caplog.at_level(logging.INFO, "objectmorpher.worker.job_error"):
+    with caplog.at_level(logging.INFO, "objectmorpher.worker.requests"):
         for function in (job_functions.fail, job_functions.divide, job_functions.refuse):
             start(worker, log, function)
             run_until(worker, lambda: worker.is_idle)

@@ -20,6 +20,13 @@ from objectmorpher_core.document.model import Document, Placement
 
 
 @pytest.fixture
+def editor(editor: Editor) -> Editor:
+    """One that has drawn nothing: how long it took others decides on the size of a draft."""
+    editor.close()
+    return editor
+
+
+@pytest.fixture
 def moved(ball: Document) -> Document:
     """The ball, turned a little."""
     return edits.set_placement(ball, 0, Placement(turn=(12.0, 0.0, 0.0)))

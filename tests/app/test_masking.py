@@ -18,7 +18,7 @@ from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.tasks import Combine, Question
 from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
-from objectmorpher.tools.mask_tool import MaskTool
+from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher.tools.pointer import Button
 from objectmorpher.tools.registry import Tool
 from objectmorpher.tools.select_tool import SelectTool

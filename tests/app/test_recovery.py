@@ -9,9 +9,8 @@ import pytest
 
 from edit_until_killed import base_document, step_document
 from editor_steps import wait_until
-from objectmorpher.editor.autosave import LOCK, recovery_root
+from objectmorpher.editor.autosave import LOCK, FileLock, recovery_root
 from objectmorpher.editor.editor import Editor
-from objectmorpher.system.file_lock import FileLock
 from objectmorpher_core.session.journal import DOCUMENT, Journal
 from test_autosave import folders, settle
 

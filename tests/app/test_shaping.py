@@ -12,7 +12,7 @@ from editor_steps import CENTRE, lift_ball, wait_for_jobs
 from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Painted, Selecting, ToolName
-from objectmorpher.tools.mask_tool import MaskTool
+from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher_core import splat_files
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits

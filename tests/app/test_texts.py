@@ -29,7 +29,7 @@ SHOWING = {
     "complain", "label", "menu_item", "begin_menu", "icon_button", "input_text_with_hint",
 }  # fmt: skip
 TABLES = ("Command", "Number", "Segment")  # constructors whose first argument is an English text
-TABLE_FILES = ("commands/gestures.py", "commands/__init__.py")  # literals that are all texts
+TABLE_FILES = ("editor/shortcuts.py", "commands/__init__.py")  # literals that are all texts
 ENUMS = (view.ToolName, view.Composed, view.Shown, view.Popup, Dialog, What, VideoMotion)
 
 

@@ -30,13 +30,14 @@ def run_app(environment: dict[str, str], *arguments: str) -> subprocess.Complete
     )
 
 
-@pytest.mark.parametrize("theme", quick(["dark", "light"], 1))
-def test_the_start_screen_is_drawn(
-    window_environment: dict[str, str], tmp_path: Path, theme: str
+@pytest.mark.parametrize(("theme", "is_broken"), quick([("dark", True), ("light", False)], 1))
+def test_the_start_screen_is_drawn_and_stays_where_a_photo_is_broken(
+    window_environment: dict[str, str], tmp_path: Path, theme: str, is_broken: bool
 ) -> None:
-    shot = tmp_path / "shot.png"
+    broken, shot = tmp_path / "broken.jpg", tmp_path / "shot.png"
+    broken.write_bytes(b"not a photo")
     arguments = ("--frames", "5", "--screenshot", str(shot), "--theme", theme)
-    result = run_app(window_environment, *arguments)
+    result = run_app(window_environment, *[str(broken)] * is_broken, *arguments)
     assert result.returncode == 0, result.stderr
     assert "Traceback" not in result.stderr
     pixels = np.asarray(Image.open(shot))
@@ -44,6 +45,9 @@ def test_the_start_screen_is_drawn(
     surround = (30, 31, 34) if theme == "dark" else (217, 218, 220)
     assert tuple(pixels[850, 700]) == surround
     assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1000  # the thumbnails
+    status = pixels[875:, 10:400].astype(int)
+    red = (status[..., 0] - status[..., 2] > 80).sum()
+    assert (red > 50) == is_broken  # the sentence, in the colour of errors
 
 
 @pytest.mark.parametrize("renderer", quick(["gl", "tiles"], 1))
@@ -58,18 +62,6 @@ def test_the_photo_is_shown_as_it_is(
     for x, y in ((20, 20), (90, 70), (150, 120)):
         left, top = screen_xy(x + 0.5, y + 0.5)  # at 4x and more single pixels are shown
         np.testing.assert_array_equal(pixels[round(top), round(left)], photo[y, x])
-
-
-def test_a_broken_photo_leaves_the_start_screen(
-    window_environment: dict[str, str], tmp_path: Path
-) -> None:
-    broken, shot = tmp_path / "broken.jpg", tmp_path / "shot.png"
-    broken.write_bytes(b"not a photo")
-    result = run_app(window_environment, str(broken), "--frames", "4", "--screenshot", str(shot))
-    assert result.returncode == 0, result.stderr
-    status = np.asarray(Image.open(shot))[875:, 10:400].astype(int)
-    is_red = (status[..., 0] - status[..., 2] > 80).sum()
-    assert is_red > 50  # the sentence, in the colour of errors
 
 
 def screen_xy(x: float, y: float) -> tuple[float, float]:

@@ -23,10 +23,9 @@ from objectmorpher_core.document.key_edits import (
 )
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.pose import Pose
-from objectmorpher_core.document.shrink import shrunk
 from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.scripting.animation import Clip, frames, share_at, station_at
+from objectmorpher_core.scripting.animation import Clip, frames, share_at, shrunk, station_at
 from objectmorpher_core.scripting.outputs import Export
 from objectmorpher_core.scripting.script import script_from
 from objectmorpher_core.session.file import decode_session, encode_session

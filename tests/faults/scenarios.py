@@ -17,7 +17,7 @@ import numpy as np
 from objectmorpher.editor.export_plan import ExportPlan, What
 from objectmorpher.editor.settings import Settings, read_settings, write_settings
 from objectmorpher.server.address import TokenError, read_token, write_token
-from objectmorpher.worker.export_functions import write_export
+from objectmorpher.worker.job_functions import write_export
 from objectmorpher_core.base.files import write_all, write_new
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.document.model import Document, Placement

@@ -314,7 +314,7 @@ def _object_of(session: Path, what: str, out: Path, progress: Progress) -> bytes
 
 def run_warm_up(options: argparse.Namespace) -> None:
     """`objectmorpher warm-up`"""
-    from ..system.first_start import compile_kernels
+    from ..system.warm_up import compile_kernels
 
     compile_kernels()
 

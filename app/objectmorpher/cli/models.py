@@ -119,7 +119,7 @@ def _get_set(id: str, options: argparse.Namespace) -> None:
 def _set_up(options: argparse.Namespace) -> None:
     """The environment that holds PyTorch: made, brought up to date, or removed."""
     from objectmorpher_core.base import torch_environment
-    from objectmorpher_core.models import torch_build, torch_setup
+    from objectmorpher_core.models import torch_setup
 
     if options.is_undone:
         size = torch_setup.unmake()
@@ -129,7 +129,7 @@ def _set_up(options: argparse.Namespace) -> None:
         raise UsageError(f"models setup takes no name such as {options.id!r}")
     if options.wheels and not options.wheels.is_dir():
         raise UsageError(f"{options.wheels} is no folder")
-    build = torch_build.build_for(torch_build.this_machine(), options.build or "")
+    build = torch_setup.build_for(torch_setup.this_machine(), options.build or "")
     plan = torch_setup.plan(build, options.wheels)
     told = f"PyTorch in the build {build.name}, because {build.why}"
     if plan.wheels is None:

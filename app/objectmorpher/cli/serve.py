@@ -52,12 +52,12 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
 
 def run_serve(options: argparse.Namespace) -> None:
     """Serves until it is interrupted or ended."""
+    from ..editor.settings import STAGES
     from ..server.cluster import Cluster, ClusterPlan
     from ..server.front import Front, RequestLimits
     from ..server.running import Alone
     from ..server.table import table
     from ..system.logs import show_log
-    from ..worker.stages import STAGES
 
     if options.web:
         _run_web(options)

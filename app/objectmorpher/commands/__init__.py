@@ -6,7 +6,7 @@ from ..editor.editor import Editor
 from ..editor.tasks import SELECT
 from ..editor.view import ToolName
 from ..system.texts import t
-from . import compose, edit, look, objects, place, pose, select
+from . import compose, edit, look, objects, pose, select
 from .command import Command
 
 # Which settings there are, by the command that brings them into view: for the command palette.
@@ -43,7 +43,7 @@ GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of short
     "Select": select.COMMANDS,
     "Objects": objects.COMMANDS,
     "Pose": pose.COMMANDS,
-    "Place": place.COMMANDS,
+    "Place": objects.PLACE_COMMANDS,
     "Look": look.COMMANDS,
     "Compose": compose.COMMANDS,
     "Window": edit.WINDOW_COMMANDS,

@@ -1,4 +1,4 @@
-"""The photo's objects as things in a list: copies, names, and which covers which."""
+"""The photo's objects: copies, names, which covers which, and where each one is."""
 
 from __future__ import annotations
 
@@ -60,3 +60,52 @@ COMMANDS: dict[str, Command] = {
     "to_front": _raise("Bring to front", "Ctrl+Shift+]", FAR),
     "to_back": _raise("Send to back", "Ctrl+Shift+[", -FAR),
 }
+
+
+def _not_moved(editor: Editor) -> str | None:
+    placement = editor.placing.placement
+    if placement is None:
+        return no_lift(editor)
+    return t("The object is where it was in the photo") if placement.is_identity else None
+
+
+def _not_shifted(editor: Editor) -> str | None:
+    placement = editor.placing.placement
+    if placement is None:
+        return no_lift(editor)
+    is_there = placement.move == (0.0, 0.0) and placement.depth == 0
+    return t("The object is where it was in the photo") if is_there else None
+
+
+def _not_turned(editor: Editor) -> str | None:
+    placement = editor.placing.placement
+    if placement is None:
+        return no_lift(editor)
+    return None if any(placement.turn) else t("The object is not turned")
+
+
+def _not_sized(editor: Editor) -> str | None:
+    placement = editor.placing.placement
+    if placement is None:
+        return no_lift(editor)
+    return t("The object has its own size") if placement.scale == 1 else None
+
+
+PLACE_COMMANDS: dict[str, Command] = {
+    "reset_place": Command(
+        "Back to where it was", "", lambda e: e.placing.reset(), _not_moved
+    ),
+    "reset_position": Command(
+        "Reset position", "", lambda e: e.placing.reset_position(), _not_shifted
+    ),
+    "reset_turn": Command(
+        "Reset turn", "", lambda e: e.placing.reset_turn(), _not_turned
+    ),
+    "reset_size": Command(
+        "Reset size", "", lambda e: e.placing.reset_size(), _not_sized
+    ),
+    "ground": Command(
+        "Move over the ground", "G", lambda e: e.placing.toggle_ground(), no_lift,
+        lambda e: e.placing.is_grounded,
+    ),
+}  # fmt: skip

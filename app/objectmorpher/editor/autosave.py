@@ -11,13 +11,14 @@ import logging
 import os
 import queue
 import shutil
+import sys
 import threading
 import time
 import uuid
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import platformdirs
 
@@ -25,11 +26,52 @@ from objectmorpher_core.document.model import Document
 from objectmorpher_core.session.journal import DOCUMENT, Journal
 from objectmorpher_core.session.tree import SessionError
 
-from ..system.file_lock import FileLock
 from ..system.texts import t
 
 if TYPE_CHECKING:
     from .state import EditorState
+
+
+class FileLock:
+    """A lock on a file, from `take` to `release`, or until its process ends, however it does."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    @classmethod
+    def take(cls, path: Path) -> FileLock | None:
+        """The lock, or None where another process or editor holds it. Raises OSError."""
+        file = path.open("ab")
+        try:
+            _lock(file)
+        except OSError:
+            file.close()
+            return None
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n".encode())  # for people who look into the folder
+        file.flush()
+        return cls(file)
+
+    def release(self) -> None:
+        self._file.close()
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    FAR = 1 << 30  # a byte beyond the file's end, so that others can still read what it holds
+
+    def _lock(file: IO[bytes]) -> None:
+        file.seek(FAR)
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        file.seek(0)
+
+else:
+    import fcntl
+
+    def _lock(file: IO[bytes]) -> None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
 
 log = logging.getLogger(__name__)
 

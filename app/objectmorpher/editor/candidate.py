@@ -24,9 +24,9 @@ from objectmorpher_core.document.model import Click, Photo, Prompt
 from objectmorpher_core.segment import Found
 
 from ..worker import job_functions
-from ..worker.job_error import JobError
 from ..worker.job_functions import BackendChoice
 from ..worker.jobs import RELUCTANCE
+from ..worker.requests import JobError
 from .tasks import SELECT, Question, Tasks
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from objectmorpher_core.document.model import Document
 from ..canvas.shape import Shapes, build_ready
 from ..system import clipboard
 from ..system.texts import t
-from ..worker.job_error import JobError
+from ..worker.requests import JobError
 from .export_plan import FORMATS
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, OpenedFile, is_object, read_document, read_photo
 

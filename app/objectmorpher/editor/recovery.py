@@ -17,10 +17,9 @@ from objectmorpher_core.session.journal import DOCUMENT, Journal, read_about, re
 from objectmorpher_core.session.tree import SessionError
 
 from ..canvas.shape import Shapes, build_ready
-from ..system.file_lock import FileLock
 from ..system.texts import t
-from ..worker.job_error import JobError
-from .autosave import LOCK, HeldJournal, recovery_root
+from ..worker.requests import JobError
+from .autosave import LOCK, FileLock, HeldJournal, recovery_root
 from .feedback import Action
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from objectmorpher_core.segment.mask_edit import as_coverage
 
 from ..system.texts import t
 from ..worker import job_functions
-from ..worker.job_error import JobError
+from ..worker.requests import JobError
 
 if TYPE_CHECKING:
     from objectmorpher_core.lift.refitting import Refitted

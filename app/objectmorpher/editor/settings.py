@@ -5,13 +5,18 @@ from __future__ import annotations
 import logging
 import os
 import tomllib
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import platformdirs
 
 from objectmorpher_core.base.files import make_folder, write_all
 from objectmorpher_core.document.model import GAUSSIANS
+
+if TYPE_CHECKING:
+    from objectmorpher_core.doctor import StageReport
 
 log = logging.getLogger(__name__)
 
@@ -20,6 +25,16 @@ LARGEST = 1e9  # of any number that is no whole one
 AUTO = "auto"
 HERE, SERVER = "here", "server"  # where jobs run
 TABLES = ("backends", "shortcuts")  # of the file; everything else is a line of it
+DOCTORS = {  # stage, as in the settings -> what the doctor calls it
+    "segment": "select", "lift": "lift", "inpaint": "background", "refine": "refine",
+}  # fmt: skip
+STAGES = tuple(DOCTORS)
+
+
+def by_stage(looked_at: Iterable[StageReport]) -> dict[str, StageReport]:
+    """Return the doctor's findings by the names of STAGES."""
+    found = {stage.name: stage for stage in looked_at}
+    return {stage: found[name] for stage, name in DOCTORS.items()}
 
 
 @dataclass(frozen=True)

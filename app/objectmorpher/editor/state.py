@@ -18,9 +18,9 @@ from ..canvas.derived import Derived
 from ..canvas.frame import Cache
 from ..system.texts import sentence, t
 from ..tools.pointer import Hand, Pointer
-from ..worker.job_error import JobError
 from ..worker.job_functions import WARM
 from ..worker.jobs import Jobs
+from ..worker.requests import JobError
 from ..worker.threads import Chores
 from .feedback import Action, Hover, StatusMessage
 from .history import History

@@ -32,8 +32,8 @@ from ..canvas.memo import same
 from ..canvas.shape import CanvasShape, build_ready_shape, rehearse
 from ..system.texts import folder_of, t
 from ..worker import job_functions
-from ..worker.job_error import JobError
 from ..worker.job_functions import BackendChoice, Cut
+from ..worker.requests import JobError
 from .feedback import Action
 from .view import SelectMode, ToolName
 

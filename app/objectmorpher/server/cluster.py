@@ -26,7 +26,7 @@ from typing import Any, cast
 
 from objectmorpher_core.base.progress import Cancelled, Progress
 
-from ..worker.stages import STAGES
+from ..editor.settings import STAGES
 from .offers import Offers, look_at_offers
 from .running import Call, JobOutcome, perform
 from .table import Served, table

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..editor.settings import AUTO
-from ..worker.stages import STAGES, by_stage
+from ..editor.settings import AUTO, STAGES, by_stage
 
 MOST_NAMES = 64  # of a stage's backends that a server may name
 MOST_LETTERS = 48

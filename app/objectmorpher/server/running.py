@@ -9,9 +9,8 @@ from typing import Any, Protocol
 
 from objectmorpher_core.base.progress import Cancelled, Progress
 
-from ..editor.settings import AUTO
-from ..worker.job_error import JobError
-from ..worker.stages import STAGES
+from ..editor.settings import AUTO, STAGES
+from ..worker.requests import JobError
 from .message import MessageError, decode, encode
 from .offers import Offers, look_at_offers
 from .table import Served, types

@@ -7,8 +7,7 @@ from typing import Protocol
 from ..editor.editor import Editor
 from ..editor.view import Orbit, ToolName
 from ..system.texts import t
-from .compose_tool import ComposeTool
-from .mask_tool import MaskTool
+from .brush_tools import ComposeTool, MaskTool
 from .place_tool import PlaceTool
 from .pointer import TURN_SPEED, Button, Pointer, PointerShape, Stroke, has_moved
 from .pose_tool import PoseTool

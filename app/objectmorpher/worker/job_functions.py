@@ -7,6 +7,7 @@ starts without them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,7 @@ from objectmorpher_core.document.settings import Hint
 from ..canvas.layer import ExactPicture, Rendered
 from ..canvas.layers import render
 from ..canvas.shape import rehearse_lift
+from ..editor.export_plan import ExportPlan
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import PlatePatch
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
+    from objectmorpher_core.scripting.outputs import Export
     from objectmorpher_core.scripting.runner import RefineOptions
     from objectmorpher_core.segment import Found, Segmenter
     from objectmorpher_core.segment.matting.repair import EdgeStroke
@@ -321,8 +324,7 @@ def take_shadow(
     """
     from objectmorpher_core import compose
     from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
-    from objectmorpher_core.compose.shadow.shadow_evidence import LIKELY
-    from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
+    from objectmorpher_core.compose.shadow.shadow_fit import LIKELY, find_old_shadow
 
     progress(0.0, "")
     old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, LIKELY)
@@ -365,3 +367,42 @@ def look_at_stages(progress: Progress) -> tuple[StageReport, ...]:
     from objectmorpher_core import doctor
 
     return doctor.look_at_stages()
+
+
+def write_export(document: Document, plan: ExportPlan, progress: Progress) -> None:
+    """Renders what the plan asks for and writes it. Raises OutputError, ImageError."""
+    from objectmorpher_core.base.files import make_folder, write_all
+
+    export = _export(document, plan, progress)
+    if not plan.is_folder:
+        data = export.encode(plan.what.key, plan.path)
+        progress(0.95, "writing")
+        write_all({plan.path: data})
+        return
+    outputs = export.files(plan.what.key, plan.path)
+    is_new = not plan.path.exists()
+    try:
+        make_folder(plan.path)
+        write_all(outputs)
+    except OSError:
+        if is_new:
+            with suppress(OSError):  # what the disk keeps, it keeps
+                plan.path.rmdir()
+        raise
+
+
+def encode_export(document: Document, plan: ExportPlan, progress: Progress) -> bytes:
+    """Return the file that `write_export` would write."""
+    return _export(document, plan, progress).encode(plan.what.key, plan.path)
+
+
+def _export(document: Document, plan: ExportPlan, progress: Progress) -> Export:
+    from objectmorpher_core.scripting.animation import Clip
+    from objectmorpher_core.scripting.outputs import Export
+
+    progress(0.02, "drawing")
+    clip = Clip(plan.motion.name.lower(), plan.seconds, object=plan.object)
+    return Export(
+        document, object=plan.object, bits=plan.bits, quality=plan.quality,
+        webp_quality=plan.quality, clip=clip, progress=progress,
+    )  # fmt: skip

@@ -24,8 +24,7 @@ from objectmorpher_core.base.progress import Cancelled
 
 from ..system.logs import crash_folder, note_crashes
 from .apart import ApartProcess, Flag
-from .job_error import JobError
-from .requests import Executor, Request
+from .requests import Executor, JobError, Request
 from .wire import Connection, PipeReader, PipeWriter
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from typing import Any
 
 from objectmorpher_core.base.progress import Cancelled
 
-from .job_error import JobError
-from .requests import Executor, Request
+from .requests import Executor, JobError, Request
 
 FAREWELL = 1.0  # s that closing waits for what was asked to stop
 

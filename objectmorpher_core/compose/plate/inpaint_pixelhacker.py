@@ -51,7 +51,7 @@ class PixelHackerInpainter:
 
     def inpaint(self, rgb: Pixels, hole: Mask, progress: Progress, seed: int = 0) -> Pixels:
         """See `Inpainter`. The same bytes on one device; raises InpaintError, too, if it fails."""
-        from .pixelhacker.sampler import sample
+        from .pixelhacker import sample
 
         progress(0.0, "opening the model")
         try:
@@ -82,7 +82,7 @@ def _model(weights: Path, codec: Path) -> ledger.Model[tuple[Any, Any]]:
     def opened(plan: Plan) -> tuple[Any, Any]:
         import torch
 
-        from .pixelhacker.network import load, load_codec
+        from .pixelhacker import load, load_codec
 
         network = load(weights, plan.device, getattr(torch, plan.number))
         return network, load_codec(codec, plan.device)
@@ -105,7 +105,7 @@ def _files() -> tuple[Path, Path]:
 
 def _side(weights: Path, codec: Path) -> int:
     """px of the square that it sees. Raises ModelError."""
-    from .pixelhacker.network import read_config
+    from .pixelhacker import read_config
 
     try:
         said = json.loads((codec / "config.json").read_text(encoding="utf-8"))

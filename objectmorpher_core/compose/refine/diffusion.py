@@ -27,7 +27,7 @@ from ...models.weight_folder import (
     stamp,
 )
 from . import RefineError
-from .alignment import measure, warped
+from .refinement import measure, warped
 
 # What a pipeline in a folder asks of memory, by its files, and how it is put where it runs.
 

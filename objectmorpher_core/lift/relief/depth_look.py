@@ -91,7 +91,7 @@ class Net(Protocol):
 def _opened(there: There) -> Net:
     if there.is_onnx:
         return DepthNet(there.at)
-    from ...models.depth_torch import DepthTorch
+    from ...models.depth_net import DepthTorch
 
     return DepthTorch(there.at)
 

@@ -8,7 +8,7 @@ from ...base.arrays import F64
 from ...base.camera import Camera
 from ...base.progress import Progress
 from ...document.gaussians import Gaussians
-from ...splat_files.splats.ply_table import QUARTER_TURN, turned
+from ...splat_files.splats.ply import QUARTER_TURN, turned
 from .. import LiftSubject
 from ..registration.placement import Hints
 from . import configs

@@ -12,7 +12,7 @@ from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings
 from ...models import ModelError, ledger
 from ...models.plans import Need
-from ...splat_files.splats.ply_table import QUARTER_TURN, turned
+from ...splat_files.splats.ply import QUARTER_TURN, turned
 from .. import LiftError, LiftSubject
 from ..registration.imported import lift_imported
 from ..registration.placement import Hints, Proposal, Registrar, register

@@ -11,7 +11,7 @@ from PIL import Image
 
 from ...base.arrays import F32, F64
 from ...document.model import Matte
-from ...models.depth_torch import open_net
+from ...models.depth_net import open_net
 from ...models.registry import ModelError
 from .. import LiftError
 

@@ -20,7 +20,7 @@ from ...base.arrays import F64, U8
 from ...base.limits import MESH_BYTES as MAX_MESH
 from ...document.gaussians import Gaussians
 from ..limits import GREATEST, SplatFileError
-from ..splats.ply_table import HALF_TURN, QUARTER_TURN, read_header, turned
+from ..splats.ply import HALF_TURN, QUARTER_TURN, read_header, turned
 from .gltf_check import MAX_SIDE, MAX_TRIANGLES, MeshFolder, check_gltf
 from .sampling import sample_surface
 from .surface import WORKING, Look, Texture, TriangleMesh, linear_from_srgb

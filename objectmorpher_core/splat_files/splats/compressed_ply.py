@@ -17,7 +17,7 @@ import numpy as np
 from ...base.arrays import F32, F64
 from ...document.gaussians import Gaussians
 from ..limits import LEAST_SCALE, SplatFileError, check_count, empty_columns, mended
-from .ply_table import PlyHeader, Table, blocks, read_header
+from .ply import PlyHeader, Table, blocks, read_header
 
 CHUNK = 256  # Gaussians that share bounds
 BITS_111011 = ((21, 11), (11, 10), (0, 11))  # (shift, bits) of x, y, z

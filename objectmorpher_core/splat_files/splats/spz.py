@@ -28,8 +28,7 @@ from ...base.arrays import F32, U8
 from ...base.limits import SPLATS_UNPACKED as MAX_UNPACKED
 from ...document.gaussians import Gaussians
 from ..limits import LEAST_SCALE, SplatFileError, check_count, empty_columns, mended
-from .ply import SH0
-from .ply_table import half_turned
+from .ply import SH0, half_turned
 
 # The container of an .spz file's columns: header, gzip (versions 1 to 3) or zstandard streams (4).
 #

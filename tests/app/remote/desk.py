@@ -35,7 +35,8 @@ class Counting(Alone):
 class Desk:
     """A window's jobs, the server that they may go to, and what the status bar says."""
 
-    def __init__(self) -> None:
+    def __init__(self, jobs: Jobs) -> None:
+        """`jobs` are done by a worker process that starts in seconds: desks may share it."""
         self.runner = Counting()
         self.front = Front(("127.0.0.1", 0), TOKEN, self.runner, table())
         self.front.start()
@@ -44,7 +45,7 @@ class Desk:
         self.answers: list[Any] = []
         self.errors: list[Any] = []
         self.cancels = 0
-        self.jobs = Jobs()
+        self.jobs = jobs
         self.elsewhere = Elsewhere(lambda: self.server, lambda server, why: self.said.append(why))
         self.jobs.elsewhere = self.elsewhere
 
@@ -65,7 +66,8 @@ class Desk:
             time.sleep(0.01)
 
     def close(self) -> None:
-        self.jobs.close()
+        self.jobs.cancel()
+        self.wait()
         self.front.close()
 
 

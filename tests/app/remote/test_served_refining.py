@@ -16,6 +16,7 @@ from objectmorpher.server.client import call
 from objectmorpher.server.fitting import is_sound
 from objectmorpher.server.offers import Offer
 from objectmorpher.worker import job_functions
+from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.base.arrays import F32, RGB, frozen
 from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.compose import refine
@@ -118,7 +119,7 @@ def test_a_networks_refinement_is_the_same_there_and_here_when_the_server_has_go
     flat, hole = np.full((96, 96, 3), 128, np.uint8), np.zeros((96, 96), np.float32)
     hole[40:60, 40:60] = 1
     asked = CoarseEdit(0, 0, flat, flat, hole), RefineOptions("auto", 3)
-    desk = Desk()  # its worker starts with that folder
+    desk = Desk(Jobs())  # its worker starts with that folder
     try:
         assert desk.runner.offers()["refine"] == Offer("klein", ("klein",))
         for _ in range(2):
@@ -127,6 +128,7 @@ def test_a_networks_refinement_is_the_same_there_and_here_when_the_server_has_go
             desk.front.close()
     finally:
         desk.close()
+        desk.jobs.close()
     assert desk.errors == [] and len(desk.said) == 1 and desk.runner.asked == ["refine"]
     there, here = desk.answers
     assert there.backend == "klein" and same_values(there, here)

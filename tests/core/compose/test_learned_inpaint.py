@@ -51,7 +51,7 @@ def pixelhacker(tmp_path, monkeypatch) -> Path:
 def test_chunks_are_the_recurrence(length, closed):
     """Also where gates are all but shut, whose cumulative logarithm no float32 can invert."""
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker.network import chunked, recurrence
+    from objectmorpher_core.compose.plate.pixelhacker import chunked, recurrence
 
     random = torch.Generator().manual_seed(length)
     q, k, logits = torch.randn(3, 2, 3, length, 5, generator=random)
@@ -63,7 +63,7 @@ def test_chunks_are_the_recurrence(length, closed):
 
 def test_pairs_in_portions_are_the_same(monkeypatch):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker import network as attention
+    from objectmorpher_core.compose.plate import pixelhacker as attention
 
     q, k, g = torch.randn(3, 1, 2, 70, 4, generator=torch.Generator().manual_seed(0))
     once = attention.chunked(q, k, q, -g.abs())
@@ -75,7 +75,7 @@ def test_keys_and_shapes_are_the_published_ones():
     """As the published classes name them, with the published configuration: 862 M numbers."""
     torch = pytest.importorskip("torch")
     pytest.importorskip("diffusers")
-    from objectmorpher_core.compose.plate.pixelhacker.network import PUBLISHED, build
+    from objectmorpher_core.compose.plate.pixelhacker import PUBLISHED, build
 
     def flat(tree: dict, path: str = "") -> dict[str, str]:
         found = {}
@@ -121,9 +121,8 @@ def test_each_step_is_told_and_can_be_the_last(pixelhacker, view, hole):
 
 def test_bfloat16_invents_nearly_the_same(pixelhacker):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker.network import load as load_network
-    from objectmorpher_core.compose.plate.pixelhacker.network import load_codec
-    from objectmorpher_core.compose.plate.pixelhacker.sampler import sample
+    from objectmorpher_core.compose.plate.pixelhacker import load as load_network
+    from objectmorpher_core.compose.plate.pixelhacker import load_codec, sample
 
     codec = load_codec(pixelhacker / "vae", "cpu")
     weights = pixelhacker / "diffusion_pytorch_model.safetensors"
@@ -140,7 +139,7 @@ def test_bfloat16_invents_nearly_the_same(pixelhacker):
 
 def test_the_masks_cells_are_whole():
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker.sampler import in_cells
+    from objectmorpher_core.compose.plate.pixelhacker import in_cells
 
     mask = torch.zeros(1, 1, 32, 32)
     mask[..., 13, 13] = 1
@@ -150,7 +149,7 @@ def test_the_masks_cells_are_whole():
 
 def test_memory_that_runs_out_is_followed_by_the_next_tier(pixelhacker, view, hole, monkeypatch):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker import network
+    from objectmorpher_core.compose.plate import pixelhacker as network
 
     ways = Ways(Plan("cpu", "bfloat16", "whole"), Plan("cpu", "float32", "cpu"))
     monkeypatch.setattr(inpaint_pixelhacker, "need", lambda parameters: ways)

@@ -73,7 +73,7 @@ def pixelhacker(seed: int = 0) -> Any:
     """The network, in memory."""
     import torch
 
-    from objectmorpher_core.compose.plate.pixelhacker.network import PUBLISHED, build
+    from objectmorpher_core.compose.plate.pixelhacker import PUBLISHED, build
 
     torch.manual_seed(seed)
     return build({**PUBLISHED, **TINY}).eval()

@@ -67,29 +67,24 @@ def test_a_blurred_jump_is_made_sharp(blur):
     assert np.array_equal(again[far], blurred[far])
 
 
-def body_with_arm():
-    """A figure whose arm, or leg, is before the rest of it; the sample and its body."""
-    for seed in range(40):
-        sample = make_sample(seed, families=("figures",))
-        apart = (sample.depth - sample.thickness > 0.06) & sample.mask
-        if sample.edge.sum() > 60 and apart.sum() > 400:
-            body = ReliefBody.of(
-                ReliefSilhouette.of(sample.mask), camera_of(sample), LiftSettings()
-            )
-            return sample, apart, body
-    raise AssertionError("no figure has an arm before it")
+@pytest.fixture(scope="module")
+def armed():
+    """A figure whose arm, or leg, is before the rest of it: the sample, where, and its body."""
+    sample = make_sample(3, families=("figures",))
+    apart = (sample.depth - sample.thickness > 0.06) & sample.mask
+    assert sample.edge.sum() > 60 and apart.sum() > 400
+    outline = ReliefSilhouette.of(sample.mask)
+    return sample, apart, ReliefBody.of(outline, camera_of(sample), LiftSettings())
 
 
-SAMPLE, APART, BODY = body_with_arm()
-
-
-def test_an_arm_before_a_body_has_a_back_and_the_body_goes_on_beneath():
-    found = fused(BODY, truth(SAMPLE), camera_of(SAMPLE), 1.0, 1.0)
+def test_an_arm_before_a_body_has_a_back_and_the_body_goes_on_beneath(armed):
+    sample, apart, body = armed
+    found = fused(body, truth(sample), camera_of(sample), 1.0, 1.0)
     inner = found.overlaps
     assert inner is not None and found.cuts is not None
     outline = found.silhouette
     at = outline.photo_xy(outline.cells).astype(int).clip(0, SIDE - 1)
-    is_true = APART[at[..., 1], at[..., 0]] & outline.inside
+    is_true = apart[at[..., 1], at[..., 0]] & outline.inside
     assert (inner.is_apart & is_true).sum() > 0.4 * is_true.sum()
     assert (inner.is_apart & ~is_true).sum() < 0.3 * max(inner.is_apart.sum(), 1)
     front = found.sample(outline.photo_xy(outline.cells).reshape(-1, 2), FRONT)[0]
@@ -99,30 +94,32 @@ def test_an_arm_before_a_body_has_a_back_and_the_body_goes_on_beneath():
     assert (inner.walls.foot <= inner.walls.top).all()
 
 
-def test_no_front_hangs_between_two_parts():
+def test_no_front_hangs_between_two_parts(armed):
     """Uncut, the front is a curtain from the arm to the body behind it."""
+    sample, _, whole = armed
 
     def hanging(seen) -> float:
-        body = fused(BODY, seen, camera_of(SAMPLE), 1.0, 1.0)
+        body = fused(whole, seen, camera_of(sample), 1.0, 1.0)
         surface, _ = spread(body, 6000, 1.0, np.random.default_rng(0))
         own = surface.is_front & surface.is_seen & ~surface.is_brim
         x, y = surface.xy[own].astype(int).clip(0, SIDE - 1).T
         height = surface.height[own] / SIDE
-        low, high = (f(SAMPLE.front, np.ones((3, 3))) for f in (cv2.erode, cv2.dilate))
-        shift = np.median(height - SAMPLE.front[y, x])
+        low, high = (f(sample.front, np.ones((3, 3))) for f in (cv2.erode, cv2.dilate))
+        shift = np.median(height - sample.front[y, x])
         share = (height - shift - low[y, x]) / np.maximum(high - low, 1e-3)[y, x]
         between = (share > 0.25) & (share < 0.75)
-        beside = cv2.dilate(SAMPLE.edge.astype(np.uint8), np.ones((3, 3)))[y, x] > 0
+        beside = cv2.dilate(sample.edge.astype(np.uint8), np.ones((3, 3)))[y, x] > 0
         return float(between[beside].mean())
 
-    seen = truth(SAMPLE)
+    seen = truth(sample)
     uncut = replace(seen, edge=np.zeros_like(seen.edge))
     # Settling draws some of what hangs to its side even without an edge, so cuts save less.
     assert hanging(seen) < 0.65 * hanging(uncut)
 
 
-def test_what_is_inside_is_not_seen_at_rest():
-    found = fused(BODY, truth(SAMPLE), camera_of(SAMPLE), 1.0, 1.0)
+def test_what_is_inside_is_not_seen_at_rest(armed):
+    sample, _, body = armed
+    found = fused(body, truth(sample), camera_of(sample), 1.0, 1.0)
     surface, spacing = spread(found, 6000, 1.0, np.random.default_rng(0))
     inner = surface.is_front & ~surface.is_seen
     assert inner.any()

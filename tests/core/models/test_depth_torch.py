@@ -13,7 +13,7 @@ transformers = pytest.importorskip("transformers", reason="Depth Anything needs 
 from objectmorpher_core import models  # noqa: E402
 from objectmorpher_core.lift.relief import depth_look  # noqa: E402
 from objectmorpher_core.models import device  # noqa: E402
-from objectmorpher_core.models.depth_torch import DepthTorch  # noqa: E402
+from objectmorpher_core.models.depth_net import DepthTorch  # noqa: E402
 from tests import photos  # noqa: E402
 from tests.core.models.small_networks import brightness  # noqa: E402
 

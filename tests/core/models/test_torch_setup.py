@@ -22,7 +22,7 @@ import pytest
 
 from objectmorpher_core.base import installation, torch_environment
 from objectmorpher_core.models import ModelError, torch_setup
-from objectmorpher_core.models.torch_build import TorchMachine, build_for, parse_nvidia_smi
+from objectmorpher_core.models.torch_setup import TorchMachine, build_for, parse_nvidia_smi
 from tests.tree import PYTHONPATH, ROOT
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import pytest
 from objectmorpher_core.base.rotations import quats_along, turn_matrix
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import FORMATS, encode, read
-from objectmorpher_core.splat_files.splats.ply_table import HALF_TURN, half_turned, turned
+from objectmorpher_core.splat_files.splats.ply import HALF_TURN, half_turned, turned
 from tests.core.splat_files.clouds import gaussians, matched
 
 

@@ -14,7 +14,7 @@ from objectmorpher.cli import commands
 from objectmorpher_core.base.rotations import quats_from_matrices
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import SplatFileError, encode
-from objectmorpher_core.splat_files.meshes.meshing import surface_of
+from objectmorpher_core.splat_files.meshes.textured import surface_of
 
 AXES = np.array([0.5, 0.4, 0.3])
 

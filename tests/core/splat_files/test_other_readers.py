@@ -16,8 +16,7 @@ import pytest
 
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import encode, read
-from objectmorpher_core.splat_files.splats.ply import SH0
-from objectmorpher_core.splat_files.splats.ply_table import half_turned
+from objectmorpher_core.splat_files.splats.ply import SH0, half_turned
 from tests.core.splat_files.clouds import gaussians, matched, turn_between
 
 gsply = pytest.importorskip("gsply", reason="gsply has no wheel for this machine")

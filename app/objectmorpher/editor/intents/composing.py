@@ -21,8 +21,8 @@ from ...canvas.layer import CanvasLayer
 from ...canvas.memo import same
 from ...system.texts import t
 from ...worker import job_functions
-from ...worker.job_error import JobError
 from ...worker.job_functions import BackendChoice, Variant
+from ...worker.requests import JobError
 from ..feedback import Action
 from ..tasks import PLATE
 from ..view import ToolName

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...server.elsewhere import Elsewhere
 from ...system.texts import t
-from ...worker.job_error import JobError
+from ...worker.requests import JobError
 from ..feedback import Action
 from ..settings import SERVER, settings_path
 

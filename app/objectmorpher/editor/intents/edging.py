@@ -19,7 +19,7 @@ from objectmorpher_core.document.model import EditObject, Photo
 from ...system.texts import t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
-from ...worker.job_error import JobError
+from ...worker.requests import JobError
 
 if TYPE_CHECKING:
     from ..state import EditorState

@@ -13,7 +13,7 @@ from objectmorpher_core.pictures.guests import missing_jxl
 
 from ...system import clipboard
 from ...system.texts import folder_of, t
-from ...worker.export_functions import encode_export, write_export
+from ...worker.job_functions import encode_export, write_export
 from ..export_plan import (
     FORMATS,
     LENGTHS,

@@ -23,7 +23,7 @@ from objectmorpher_core.segment.mask_edit import MaskPainting
 from ...system.texts import folder_of, t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
-from ...worker.job_error import JobError
+from ...worker.requests import JobError
 from ..feedback import Action
 from ..tasks import SELECT, WRITE
 from ..view import ToolName

@@ -14,8 +14,7 @@ from objectmorpher_core.lift.workers.file import LiftWorker
 
 from ...system.texts import t
 from ...worker import job_functions
-from ...worker.stages import by_stage
-from ..settings import AUTO
+from ..settings import AUTO, by_stage
 
 if TYPE_CHECKING:
     from objectmorpher_core.doctor import StageReport

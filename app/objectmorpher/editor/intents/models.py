@@ -15,7 +15,7 @@ from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Wei
 
 from ...system.texts import t
 from ...worker import job_functions
-from ...worker.job_error import JobError
+from ...worker.requests import JobError
 from ..feedback import Action
 from .methods import Workers
 

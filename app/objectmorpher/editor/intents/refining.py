@@ -11,7 +11,7 @@ from objectmorpher_core.document.settings import Refined
 
 from ...system.texts import t
 from ...worker import job_functions
-from ...worker.job_error import JobError
+from ...worker.requests import JobError
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.refine.refinement import CoarseEdit

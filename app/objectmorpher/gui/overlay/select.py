@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2
 
-from ...tools.mask_tool import erases
+from ...tools.brush_tools import erases
 from ..widgets.panes import fades
 from ..widgets.theme import theme
 from .canvas import ACCENT, DARK, WARM, WHITE, CanvasPainter

@@ -22,9 +22,14 @@ from objectmorpher_core.document.model import LiftedObject
 from objectmorpher_core.lift import LiftError, LiftSubject
 from objectmorpher_core.lift.registration.sketch import Matches, alike
 from objectmorpher_core.lift.registration.view import towards
-from objectmorpher_core.lift.workers.external import write_job
+from objectmorpher_core.lift.workers.external import (
+    WRONG,
+    check_similarity,
+    read_told,
+    run_worker,
+    write_job,
+)
 from objectmorpher_core.lift.workers.file import LiftWorker, read_worker, worker_names
-from objectmorpher_core.lift.workers.process import WRONG, check_similarity, read_told, run_worker
 
 from . import TrainingError
 

@@ -8,8 +8,7 @@ import pytest
 from skimage import data
 
 from objectmorpher_core.compose.refine import RefineError
-from objectmorpher_core.compose.refine.alignment import MOST_LEFT, align, measure
-from objectmorpher_core.compose.refine.refinement import check
+from objectmorpher_core.compose.refine.refinement import MOST_LEFT, align, check, measure
 from tests.tree import quick
 
 PHOTOS = {"cat": data.chelsea, "coffee": data.coffee, "rocket": data.rocket}

@@ -16,7 +16,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError, LiftSettings, LiftSubject
 from objectmorpher_core.lift.workers import external
-from objectmorpher_core.lift.workers import process as worker_process
+from objectmorpher_core.lift.workers import external as worker_process
 from objectmorpher_core.lift.workers.file import read_worker, worker_names
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests import photos

@@ -25,7 +25,7 @@ from objectmorpher_core.lift.trellis.picture import ConditionPicture
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte
-from objectmorpher_core.splat_files.splats.ply_table import QUARTER_TURN
+from objectmorpher_core.splat_files.splats.ply import QUARTER_TURN
 from tests.core.lift import registered
 from tests.core.lift.trellis import tiny_trellis
 

@@ -9,8 +9,8 @@ from functools import partial
 from imgui_bundle import ImVec2, imgui
 
 from ....commands import COMMANDS, GROUPS, SETTINGS, keys_of, run, why_not
-from ....commands.gestures import GESTURES
 from ....editor.editor import Editor
+from ....editor.shortcuts import GESTURES
 from ....editor.view import Popup
 from ....system.help_pages import pages
 from ....system.texts import t

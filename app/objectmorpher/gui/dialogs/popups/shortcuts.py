@@ -7,9 +7,8 @@ import math
 from imgui_bundle import ImVec2, imgui
 
 from ....commands import COMMANDS, GROUPS, keys_of
-from ....commands.gestures import GESTURES
 from ....editor.editor import Editor
-from ....editor.shortcuts import Shortcuts
+from ....editor.shortcuts import GESTURES, Shortcuts
 from ....system.texts import t
 from ...widgets.modal import popup
 from ...widgets.theme import SMALL_SIZE, Icon, theme
