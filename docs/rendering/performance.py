@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import growth
 import numpy as np
 from page import row
 
@@ -100,7 +101,7 @@ def write_page() -> str:
     budgets = _budgets(_budgets_of(edits, render["rows"], deform["rows"]))
     head = HEAD.format(machine=machine())
     whole = EDITS.format(backends=_backends(edits[0])) + _edits(edits)
-    return head + budgets + whole + frames + SOLVES + _solves(deform["rows"])
+    return head + budgets + whole + frames + SOLVES + _solves(deform["rows"]) + growth.section()
 
 
 def _budgets_of(edits: list[Row], frames: list[Row], solves: list[Row]) -> list[Budget]:
