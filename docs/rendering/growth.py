@@ -169,7 +169,7 @@ def section() -> str:
 
 
 def _listed(rows: Rows) -> str:
-    return ", ".join(f"{count:,g}: {ms:,.0f}" for count, ms in rows)
+    return ", ".join(f"{count:,.10g}: {ms:,.0f}" for count, ms in rows)
 
 
 TEXT = """
@@ -178,7 +178,7 @@ TEXT = """
 ![](rendering/growth.png)
 
 Both axes are logarithmic; the exponent is that of the three largest. Milliseconds of processor
-time, of both cores together; an edit's are by the clock.
+time, of both cores together; an edit's are by the clock, of first runs.
 
 - A frame of the cloud at 1024² grows with the power {frame:.2f} of its Gaussians ({frames}).
 - A frame's solve, until nothing moves, with the power {solve:.2f} of its nodes ({solves}).
