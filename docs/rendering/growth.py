@@ -98,7 +98,7 @@ def measure_edits() -> Rows:
         pixels = cv2.resize(photo, (side, side), interpolation=cv2.INTER_CUBIC)
         with tempfile.TemporaryDirectory() as folder:
             source, made = Path(folder) / "photo.png", Path(folder) / "out.png"
-            source.write_bytes(encode_picture(Picture(pixels), ".png"))
+            source.write_bytes(encode_picture(Picture(pixels.astype(np.uint8)), ".png"))
             command = [sys.executable, "-m", "objectmorpher", "edit", str(source), "--subject"]
             start = time.perf_counter()
             subprocess.run([*command, "--turn", "15,0,0", "-o", str(made)], cwd=ROOT, check=True)

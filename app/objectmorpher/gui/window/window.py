@@ -102,7 +102,8 @@ class Window:
         self._options = options
         self._handle, self._size = handle, WindowSize(handle)
         self._renderer = Renderer(options.renderer)
-        self._flush = ctypes.CFUNCTYPE(None)(glfw.get_proc_address("glFlush"))
+        flush: Any = glfw.get_proc_address("glFlush")
+        self._flush = ctypes.CFUNCTYPE(None)(flush)
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
         self.editor.filing.fov, self.editor.filing.seed = options.fov, options.seed
