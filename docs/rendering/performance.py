@@ -102,9 +102,11 @@ one and a half frames. 33 ms are a frame of 22; it was 51, and 42 with 100,000 G
 
 Since those were measured a frame asks for its background once, the canvas is put together without
 a branch a pixel, the thread that asks for a loop takes its part of it, and the driver copies while
-the panels are laid out. A budget of 22 ms asks for more. Drafts of this lift miss the exact picture
-by 1.5 to 2.5 levels (the worst channel, on average over the canvas), mostly along its edge, where
-a draft has a third of the Gaussians; with all of them it would be 1.1 to 2.2, and take 8 ms more.
+the panels are laid out: 70 ms of processor time a frame, 76 before (60 frames each, one run); the
+clock said nothing, with so much else to do. A frame of 22 ms asks for more. Drafts of this lift
+miss the exact picture by 1.5 to 2.5 levels (the worst channel, on average over the canvas), mostly
+along its edge, where a draft has a third of the Gaussians; with all of them it would be 1.1 to 2.2,
+and take 8 ms more.
 
 Tried, and left out: sharpening along straight pieces of the map (a quarter less on a made picture,
 nothing on a real one), and a quad in place of the copy (0.8 ms of 6.7).
