@@ -46,11 +46,11 @@ def measure() -> list[Row]:
     return rows
 
 
-class _Canvas:
+class Canvas:
     """A picture that is drawn larger than it is written."""
 
-    def __init__(self) -> None:
-        self.image = Image.new("RGB", (SIZE[0] * SCALE, SIZE[1] * SCALE), "white")
+    def __init__(self, size: tuple[int, int] = SIZE) -> None:
+        self.image = Image.new("RGB", (size[0] * SCALE, size[1] * SCALE), "white")
         self._draw = ImageDraw.Draw(self.image)
         self._font = ImageFont.load_default(FONT_SIZE * SCALE * 0.85)
 
@@ -70,7 +70,7 @@ class _Canvas:
 
 def draw_curves(rows: list[Row], path: Path) -> None:
     """Frame time against Gaussians, both logarithmic; thin: the least that was taken."""
-    canvas = _Canvas()
+    canvas = Canvas()
     width, height = SIZE[0] - LEFT - RIGHT, SIZE[1] - TOP - BOTTOM
 
     def at(count: float, milliseconds: float) -> tuple[float, float]:
@@ -102,7 +102,7 @@ def draw_curves(rows: list[Row], path: Path) -> None:
 
 def draw_parts(rows: list[Row], path: Path) -> None:
     """Where the time of a frame goes, as shares of the parts' sum."""
-    canvas = _Canvas()
+    canvas = Canvas()
     shown = _bars(rows)
     step = (SIZE[1] - TOP - BOTTOM) / len(shown)
     left, width = 170, SIZE[0] - 170 - 100

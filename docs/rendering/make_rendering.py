@@ -17,6 +17,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent))
 
 import cost  # noqa: E402
+import growth  # noqa: E402
 import performance  # noqa: E402
 import photos  # noqa: E402
 import truth  # noqa: E402
@@ -40,7 +41,8 @@ def make_rendering() -> None:
 
 
 def make_performance() -> None:
-    """docs/performance.md"""
+    """docs/performance.md and its plots."""
+    growth.main(list(growth.TITLES))
     (HERE.parent / "performance.md").write_text(performance.write_page(), encoding="utf-8")
 
 

@@ -29,11 +29,19 @@ def in_threads(
     """
     pieces = min(max(core_count() * parts, 1), max(count // least, 1))
     bounds = [count * piece // pieces for piece in range(pieces + 1)]
-    if pieces == 1:
-        run(0, count)
-        return
-    for done in [_pool().submit(run, a, b) for a, b in pairwise(bounds)]:
-        done.result()
+    left = iter(pairwise(bounds))  # whoever is free takes the next one
+
+    def work() -> None:
+        for first, last in left:
+            run(first, last)
+
+    helpers = [_pool().submit(work) for _ in range(min(core_count(), pieces) - 1)]
+    try:
+        work()
+    finally:
+        for helper in helpers:
+            if not helper.cancel():  # others may keep the pool from ever beginning
+                helper.result()
 
 
 @cache

@@ -10,13 +10,17 @@ import pytest
 from editor_steps import wait_for_jobs
 from hands import PATIENCE
 from objectmorpher.canvas.blend import CELL
-from objectmorpher.canvas.frame import build_frame
+from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.layer import CanvasLayer
 from objectmorpher.canvas.layers import FRAME
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.posing import DRAG
 from objectmorpher.editor.view import Shown, ViewState
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
+from tests.tree import quick
+
+MOVING = 1 / 255  # of a level, what the frames of a drag miss on average over the canvas
 
 
 @pytest.fixture
@@ -78,6 +82,34 @@ def test_a_draft_covers_what_the_exact_picture_covers(editor: Editor, moved: Doc
     difference = np.abs(on_canvas[0] - on_canvas[1])[on_canvas[0].any(-1)]
     assert difference.mean() < 0.02  # they differ along the edge only
     wait_for_jobs(editor)
+
+
+@pytest.mark.parametrize("seed", quick(range(6), 2))
+def test_what_a_drag_shows_is_nearly_exact_and_leaves_nothing(
+    editor: Editor, ball: Document, seed: int
+) -> None:
+    """Of the coarsest drafts; the picture at rest is, byte for byte, that of another window."""
+    random, view = np.random.default_rng(seed), editor.view
+    moving, resting = Cache(), Cache()
+    moving.frame_time, resting.frame_time = 1e-4, np.inf
+    deformer = moving.derived.deformer(ball, 0)
+    place = deformer.points[random.integers(len(deformer.points))]
+    document, pose, misses = edits.add_handle(ball, 0, place, place), deformer.rest(), []
+    for _ in range(5):
+        place = place + random.normal(0, 0.03 * deformer.diameter, 3)
+        document = edits.move_handle(document, 0, 0, place)
+        document = moving.derived.solved(document, 0, pose, **DRAG)
+        pose = document.objects[0].pose
+        shown = [build_frame(document, view, cache).layers[0] for cache in (moving, resting)]
+        draft, exact = (_on_canvas(layer, view) for layer in shown)
+        assert shown[0].is_draft and not shown[1].is_draft
+        misses.append(np.abs(draft - exact).mean())
+    assert max(misses) <= MOVING
+    moving.frame_time = np.inf
+    build_frame(lift_free(ball), view, moving)
+    (at_rest,) = build_frame(document, view, moving).layers
+    assert at_rest.box == shown[1].box
+    assert np.array_equal(at_rest.pixels, shown[1].pixels)
 
 
 def _on_canvas(layer: CanvasLayer, view: ViewState) -> np.ndarray:

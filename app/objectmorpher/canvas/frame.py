@@ -122,7 +122,7 @@ def build_frame(
     if shown in OVER_PHOTO:  # the other views show what is below it
         refined = cache.refined.layers(document, view, shown is Shown.PROVENANCE)
     plate = cache.derived.plate(document) if moved else None
-    blend = _blend(document, [(there[k], lit[k]) for k in moved], view, cache)
+    blend = _blend(document, [(there[k], lit[k]) for k in moved], plate, view, cache)
     return Frame(objects, plate, shades, refined, blend)
 
 
@@ -205,14 +205,13 @@ def _drawn(
 
 
 def _blend(
-    document: Document, moved: list[tuple[PosedObject, Lit]], view: ViewState, cache: Cache
-) -> F32:
-    """Where the canvas shows the edit, remembered."""
+    document: Document, moved: list[tuple[PosedObject, Lit]], plate: Plate | None,
+    view: ViewState, cache: Cache,
+) -> F32:  # fmt: skip
+    """Where the canvas shows the edit, remembered; `plate` is the one that it shows."""
     looks = [look for _, look in moved]
     key = (*view.place, *((id(look.shade), look.blur) for look in looks))
     if cache.blended is None or cache.blended[0] is not document or cache.blended[1] != key:
-        is_edited = any(o.is_moved for o in document.objects)
-        plate = cache.derived.plate(document) if is_edited else None
         touched = cache.lights.touched(plate, looks, view, CELL)
         cache.blended = (document, key, build_blend(document, moved, view, touched))
     return cache.blended[2]

@@ -95,8 +95,11 @@ def _places(
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
-def _blend_row(blend, y, x0, cells, row):
-    """The blend at the canvas px (x0.., y), bilinear between the centres of the cells."""
+def _blend_row(blend, y, cells, row):
+    """The blend at the canvas px (0.., y), bilinear between the centres of the cells.
+
+    `row` begins with the half of a cell that is beside the canvas: px 0 is at CELL // 2.
+    """
     rows, columns = blend.shape
     v = (np.float32(y) + HALF) / np.float32(CELL) - HALF
     i = min(max(int(math.floor(v)), 0), rows - 1)
@@ -104,28 +107,34 @@ def _blend_row(blend, y, x0, cells, row):
     for j in range(columns):
         cells[1 + j] = blend[i, j] + t * (blend[below, j] - blend[i, j])
     cells[0], cells[columns + 1] = cells[1], cells[columns]
-    for x in range(len(row)):
-        at = x0 + x + CELL // 2  # px after the centre of the cell before the first
-        left = cells[at // CELL]
-        row[x] = left + SHARES[at % CELL] * (cells[at // CELL + 1] - left)
+    for j in range(columns + 1):
+        left, more = cells[j], cells[j + 1] - cells[j]
+        for k in range(CELL):
+            row[CELL * j + k] = left + SHARES[k] * more
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
+def _room(blend):
+    """Memory for a row of cells, and for a row of pixels, see `_blend_row`."""
+    count = blend.shape[1] + 1
+    return np.empty(count + 1, np.float32), np.empty(CELL * count, np.float32)
+
+
+# What follows has no branches: at a share of 0 and of 1, and where a layer is empty or opaque, the
+# arithmetic gives the very bytes; and vector code takes less time than a look at each pixel.
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
 def _mix(first, last, photo, back, blend, out):
     """Rows first..last of the background: the photo, and where the edit is shown what is behind."""
     height, width = out.shape
-    cells, share = np.empty(blend.shape[1] + 2, np.float32), np.empty(width, np.float32)
+    cells, row = _room(blend)
     for y in range(first, last):
-        _blend_row(blend, y, 0, cells, share)
-        for x in range(width):
-            a, b, e = photo[y, x], back[y, x], share[x]
-            if e == ZERO or a == b:
-                out[height - 1 - y, x] = a
-                continue
-            if e == ONE:
-                out[height - 1 - y, x] = b
-                continue
-            out[height - 1 - y, x] = _packed(
+        _blend_row(blend, y, cells, row)
+        share, above, below, to = row[CELL // 2 :], photo[y], back[y], out[height - 1 - y]
+        for x in range(np.uint64(width)):
+            a, b, e = above[x], below[x], share[x]
+            to[x] = _packed(
                 _red(a) + e * (_red(b) - _red(a)),
                 _green(a) + e * (_green(b) - _green(a)),
                 _blue(a) + e * (_blue(b) - _blue(a)),
@@ -135,42 +144,36 @@ def _mix(first, last, photo, back, blend, out):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
 def _add_exact(first, last, left, top, pixels, skipped, above, width, gain, blend, out):
     """Rows first..last of a layer that is px for px, without its first columns and rows."""
-    height = len(out)
-    is_plain = gain[0] == ONE and gain[1] == ONE and gain[2] == ONE
-    cells, share = np.empty(blend.shape[1] + 2, np.float32), np.empty(width, np.float32)
-    for row in range(first, last):
-        y = top + row
-        _blend_row(blend, y, left, cells, share)
-        for x in range(width):
-            p = pixels[above + row, skipped + x]
-            if p == NOTHING or share[x] == ZERO:
-                continue
-            if share[x] == ONE and p >= OPAQUE and is_plain:
-                out[height - 1 - y, left + x] = p
-                continue
-            r, g, b, a = _red(p), _green(p), _blue(p), _alpha(p)
-            _cover(out, height - 1 - y, left + x, r, g, b, a, gain, share[x])
+    cells, row = _room(blend)
+    for line in range(first, last):
+        y = top + line
+        _blend_row(blend, y, cells, row)
+        share, to = row[CELL // 2 + left :], out[len(out) - 1 - y, left:]
+        layer = pixels[above + line, skipped:]
+        for x in range(np.uint64(width)):
+            p = layer[x]
+            to[x] = _covered(to[x], _red(p), _green(p), _blue(p), _alpha(p), gain, share[x])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
 def _add_coarse(first, last, left, top, pixels, xs, x_shares, ys, y_shares, gain, blend, out):
     """Rows first..last of a layer with fewer px than its box, bilinear."""
-    height, width = len(out), len(xs)
-    cells, share = np.empty(blend.shape[1] + 2, np.float32), np.empty(width, np.float32)
+    cells, row = _room(blend)
     most_x, most_y = pixels.shape[1] - 1, pixels.shape[0] - 1
-    for row in range(first, last):
-        y = top + row
-        _blend_row(blend, y, left, cells, share)
-        i, t = ys[row], y_shares[row]
+    for line in range(first, last):
+        y = top + line
+        _blend_row(blend, y, cells, row)
+        share, to = row[CELL // 2 + left :], out[len(out) - 1 - y, left:]
+        i, t = ys[line], y_shares[line]
         below = min(i + 1, most_y)
-        for x in range(width):
+        for x in range(len(xs)):
             if share[x] == ZERO:
                 continue
             j, s = xs[x], x_shares[x]
             right = min(j + 1, most_x)
             a, b, c, d = pixels[i, j], pixels[i, right], pixels[below, j], pixels[below, right]
-            _cover(
-                out, height - 1 - y, left + x,
+            to[x] = _covered(
+                to[x],
                 _between(_red(a), _red(b), _red(c), _red(d), s, t),
                 _between(_green(a), _green(b), _green(c), _green(d), s, t),
                 _between(_blue(a), _blue(b), _blue(c), _blue(d), s, t),
@@ -180,11 +183,11 @@ def _add_coarse(first, last, left, top, pixels, xs, x_shares, ys, y_shares, gain
 
 
 @numba.njit(inline="always", error_model="numpy", fastmath=EXACT)
-def _cover(out, y, x, r, g, b, a, gain, share):
-    """A premultiplied colour, in its light (light.glsl), over the pixel."""
+def _covered(p, r, g, b, a, gain, share):
+    """The pixel `p` under a premultiplied colour in its light (light.glsl)."""
     r, g, b = min(r * gain[0], a), min(g * gain[1], a), min(b * gain[2], a)
-    rest, p = ONE - share * a / FULL, out[y, x]
-    out[y, x] = _packed(
+    rest = ONE - share * a / FULL
+    return _packed(
         rest * _red(p) + share * r, rest * _green(p) + share * g, rest * _blue(p) + share * b
     )
 

@@ -8,6 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from objectmorpher.editor.intents.posing import DRAG
 from objectmorpher_core.base.arrays import F64, RGB, Mask, frozen
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import quats_along
@@ -32,7 +33,6 @@ from .timing import Timing, ms, seconds
 
 VIEW = 1024  # px, sides of the photo
 FRAMES = 24  # of the drag, each another pose
-SOLVE = 0.010  # s, of a frame for the solver
 SWAY = 0.25  # x diameter, how far the drag goes
 PINS = 4  # control points that stay, the lowest
 DEPTH = 1.35  # world units, of the cloud's middle: it is about 800 px wide
@@ -167,7 +167,7 @@ def _dragged(name: str, lifted: LiftedObject, texture: TextureLevels, camera: Ca
     def solve(target: F64) -> None:
         nonlocal pose
         handles = (Handle(int(down[0]), top, target), *pins)
-        pose = puppet.deformer.solve(handles, start=pose, seconds=SOLVE).pose
+        pose = puppet.deformer.solve(handles, start=pose, **DRAG).pose
 
     solve(top)  # the handles are new: prepared once
     for frame in range(FRAMES):

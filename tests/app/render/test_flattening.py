@@ -111,6 +111,24 @@ def test_what_it_cannot_draw_is_left_to_the_shaders(renderer, monkeypatch, scene
         assert calls == 0
 
 
+def test_where_nothing_is_mixed_the_bytes_stay() -> None:
+    """Outside the edit the photo's, inside the background's or those of what is opaque there."""
+    from objectmorpher.render.flattening import flatten
+
+    random, size = np.random.default_rng(2), (60, 76)
+    photo, back, item = (random.integers(0, 256, (*size, 4)).astype(np.uint8) for _ in range(3))
+    photo[..., 3] = back[..., 3] = item[..., 3] = 255
+    item[:, ::3] = 0
+    blend = np.zeros((size[0] // CELL, size[1] // CELL), np.float32)
+    blend[:, 8:] = 1.0
+    layer = CanvasLayer((0.0, 0.0, float(size[1]), float(size[0])), item)
+    flat = flatten(photo, back, blend, (layer,), layer.box)[::-1]
+    edge = 8 * CELL
+    wanted = np.where(item[..., 3:] > 0, item, back)[:, edge + CELL :]
+    assert np.array_equal(flat[:, : edge - CELL], photo[:, : edge - CELL])
+    assert np.array_equal(flat[:, edge + CELL :], wanted)
+
+
 def test_another_background_is_seen_at_once(renderer, monkeypatch, scene: Scene) -> None:
     assert scene.plate is not None
     view = _view(1.9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -83,8 +84,10 @@ def _apart(places: list[ImVec2], points: float = APART) -> list[ImVec2]:
     cells = dict[tuple[int, int], ImVec2]()  # of that size: no two of one are apart
     for at in places:
         i, j = int(at.x // least), int(at.y // least)
+        if (i, j) in cells:
+            continue
         near = (cells.get((i + a, j + b)) for a in (-1, 0, 1) for b in (-1, 0, 1))
-        if all(n is None or np.hypot(at.x - n.x, at.y - n.y) >= least for n in near):
+        if all(n is None or math.hypot(at.x - n.x, at.y - n.y) >= least for n in near):
             cells[i, j] = at
     return list(cells.values())
 
