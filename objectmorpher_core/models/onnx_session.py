@@ -18,11 +18,14 @@ from typing import Any
 
 # Gives an ONNX file other inputs and outputs, without the `onnx` package.
 #
-# A file is one protobuf message: ModelProto.graph is field 7, and GraphProto's input, output and
-# value_info are fields 11, 12 and 13 (onnx.proto3, IR version 3 and later). We copy everything else
-# as it is. onnxruntime then infers the shapes anew and drops the nodes that nothing needs.
+# A file is one protobuf message: ModelProto.graph is field 7, and GraphProto's node, initializer,
+# input, output and value_info are fields 1, 5, 11, 12 and 13 (onnx.proto3, IR version 3 and later).
+# onnxruntime infers the shapes anew, but computes every node of a graph whatever is asked of it: we
+# leave out the nodes and weights that the outputs do not need, and copy everything else as it is.
 
-GRAPH, INPUT, OUTPUT, VALUE_INFO = 7, 11, 12, 13  # field numbers
+GRAPH, NODE, INITIALIZER, INPUT, OUTPUT, VALUE_INFO = 7, 1, 5, 11, 12, 13  # field numbers
+TENSOR_NAME = 8  # of an initializer
+NODE_INPUT, NODE_OUTPUT = 1, 2  # of a node
 VARINT, EIGHT_BYTES, BYTES, FOUR_BYTES = 0, 1, 2, 5  # wire types
 FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type = FLOAT
 
@@ -31,6 +34,7 @@ def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
     """`model` with the one input `images`, (n, c, h, w) of any size, and the `outputs`.
 
     `images` is the name of the model's input, `outputs` are those of any tensors inside: float32.
+    What they do not need is left out.
     """
     sizes = b"".join(bytes_field(1, bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
     tensor = bytes_field(1, FLOAT + bytes_field(2, sizes))
@@ -40,14 +44,36 @@ def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
         if number != GRAPH:
             parts.append(view[start:end])
             continue
-        graph = view[payload:end]
-        body: list[bytes | memoryview] = [
-            graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
-        ]
+        body = _needed(view[payload:end], outputs)
         body.append(bytes_field(INPUT, bytes_field(1, images.encode()) + bytes_field(2, tensor)))
         body += [bytes_field(OUTPUT, bytes_field(1, name.encode())) for name in outputs]
         parts += [_head(GRAPH, sum(map(len, body))), *body]
     return b"".join(parts)  # the weights are copied here, once
+
+
+def _needed(graph: memoryview, outputs: tuple[str, ...]) -> list[bytes | memoryview]:
+    """The fields of a graph without its interface, and without what the `outputs` do not need."""
+    fields = [f for f in _fields(graph) if f[0] not in (INPUT, OUTPUT, VALUE_INFO)]
+    wanted = {name.encode() for name in outputs}
+    kept: set[int] = set()
+    for number, start, payload, end in reversed(fields):  # nodes stand after those they need
+        if number != NODE:
+            continue
+        node = graph[payload:end]
+        if wanted & _texts(node, NODE_OUTPUT):
+            kept.add(start)
+            wanted |= _texts(node, NODE_INPUT)
+    return [
+        graph[start:end]
+        for number, start, payload, end in fields
+        if (number != NODE or start in kept)
+        and (number != INITIALIZER or wanted & _texts(graph[payload:end], TENSOR_NAME))
+    ]
+
+
+def _texts(message: memoryview, wanted: int) -> set[bytes]:
+    """The texts of the field `wanted` of a message."""
+    return {bytes(message[a:b]) for number, _, a, b in _fields(message) if number == wanted}
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int, int, int]]:
