@@ -15,6 +15,7 @@ import hashlib
 import os
 from functools import cache
 from pathlib import Path
+from subprocess import Popen
 from typing import Any
 
 import numba
@@ -96,5 +97,25 @@ def _digest(*parts: Any) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:DIGITS]
 
 
+def is_kept(kernel: Any) -> bool:
+    """Whether a variant of the kernel, as its source is now, lies on the disk, or none ever will."""
+    kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    return kept is None or bool(kept._load_index())
+
+
+# By the names of modules: the processes that are compiling their kernels just now.
+elsewhere: dict[str, Popen[bytes]] = {}
+
+
+def _load(self: Any, key: Any) -> Any:
+    """What is kept under `key`, or None. What another process is compiling is waited for."""
+    found = _load_now(self, key)
+    if found is None and (process := elsewhere.get(self._index_name.partition(".")[0])):
+        process.wait()
+        found = _load_now(self, key)
+    return found
+
+
 files: Any = caching.IndexDataCacheFile
-files.save = _save
+_load_now = files.load
+files.save, files.load = _save, _load
