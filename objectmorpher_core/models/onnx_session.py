@@ -1,4 +1,4 @@
-"""The one place where onnxruntime is imported: with its telemetry off.
+"""The one place where onnxruntime is imported: with its telemetry off, on the best device.
 
 From 1.29 on its official builds write a device's number and a queue of events (names of models,
 hardware) beneath the user's cache and send them home. The variable is read once, when the library
@@ -9,12 +9,17 @@ https://github.com/microsoft/onnxruntime/blob/main/docs/Privacy.md
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from .device import DEVICE
+
+log = logging.getLogger(__name__)
 
 # Gives an ONNX file other inputs and outputs, without the `onnx` package.
 #
@@ -132,18 +137,81 @@ WATCH_EVERY = 0.02  # s
 
 
 def open_session(network: Path | bytes, threads: int = 0, is_foreign: bool = False) -> Any:
-    """An `onnxruntime.InferenceSession` of a file or of its bytes, on the CPU. Costly.
+    """An `onnxruntime.InferenceSession` of a file or of its bytes, or a stand-in. Costly.
 
+    It runs on the GPU where the installed onnxruntime can use one, and otherwise on the CPU, with
     `threads` of one run; 0: one a core. Of a foreign file, warnings go unsaid. Raises
     onnxruntime's own kinds of exception.
     """
     onnxruntime = _runtime()
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    if is_foreign:
-        options.log_severity_level = 3
-    model = network if isinstance(network, bytes) else str(network)
-    return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+
+    def opened(provider: str, how: dict[str, str]) -> Any:
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads
+        if is_foreign or provider != CPU:
+            options.log_severity_level = 3
+        if provider == "DmlExecutionProvider":
+            options.enable_mem_pattern = False  # which it cannot have
+        providers = [(provider, how), (CPU, {})] if provider != CPU else [CPU]
+        model = network if isinstance(network, bytes) else str(network)
+        return onnxruntime.InferenceSession(model, options, providers=providers, enable_fallback=0)
+
+    provider = chosen_provider(onnxruntime.get_available_providers())
+    if provider == CPU:
+        return opened(CPU, {})
+    return _OnGpu(provider, lambda name: opened(name, PROVIDERS.get(name, {})))
+
+
+CPU = "CPUExecutionProvider"
+# Those of GPUs, the quickest first, with what keeps their numbers like the CPU's.
+PROVIDERS = {
+    "CUDAExecutionProvider": {"use_tf32": "0"},
+    "DmlExecutionProvider": {},
+    "CoreMLExecutionProvider": {"ModelFormat": "MLProgram", "MLComputeUnits": "CPUAndGPU"},
+}
+_useless: set[str] = set()  # providers that have failed in this process
+
+
+def chosen_provider(available: list[str]) -> str:
+    """What a network runs on, of onnxruntime's providers that are `available`.
+
+    The CPU where the environment asks for it, as it does for PyTorch.
+    """
+    if os.environ.get(DEVICE) == "cpu":
+        return CPU
+    usable = (p for p in PROVIDERS if p in available and p not in _useless)
+    return next(usable, CPU)
+
+
+class _OnGpu:
+    """A session that goes on on the CPU where the GPU fails: its driver is missing, it is full."""
+
+    def __init__(self, provider: str, opened: Callable[[str], Any]) -> None:
+        self._provider, self._opened = provider, opened
+        try:
+            self._session = opened(provider)
+        except Exception as error:
+            self._give_up(error)
+
+    def run(self, outputs: list[str] | None, inputs: dict[str, Any], options: Any = None) -> Any:
+        """As onnxruntime's; what was ended on purpose is not tried again."""
+        try:
+            return self._session.run(outputs, inputs, options)
+        except Exception as error:
+            if self._provider == CPU or (options is not None and options.terminate):
+                raise
+            self._give_up(error)
+            return self._session.run(outputs, inputs, options)
+
+    def _give_up(self, error: Exception) -> None:
+        if self._provider not in _useless:
+            log.info("Networks run on the CPU: %s failed: %s", self._provider, error)
+        _useless.add(self._provider)
+        self._provider = CPU
+        self._session = self._opened(CPU)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._session, name)
 
 
 def run_session(
