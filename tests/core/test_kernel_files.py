@@ -83,9 +83,9 @@ def test_python_calls_no_kernel_that_has_no_way_in() -> None:
         for item in ast.walk(tree):
             if id(item) in inside or not isinstance(item, ast.Name | ast.Attribute):
                 continue
-            of = item.value if isinstance(item, ast.Attribute) else None
-            if isinstance(of, ast.Name):
-                place = (modules.get(of.id, ""), item.attr)
-            else:
-                place = known.get(item.id, ("", "")) if isinstance(item, ast.Name) else ("", "")
+            place = ("", "")
+            if isinstance(item, ast.Name):
+                place = known.get(item.id, place)
+            elif isinstance(item.value, ast.Name):
+                place = (modules.get(item.value.id, ""), item.attr)
             assert place not in hidden, f"{path}:{item.lineno}: {place[1]}"
