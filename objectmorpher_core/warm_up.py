@@ -2,18 +2,42 @@
 
 `python -m objectmorpher_core.warm_up` runs the main job on a made picture of 96 x 96 pixels, and
 then, small, whatever else compiles something. The kernels stay in numba's cache on the disk.
+
+The first edit after an installation needs most of them, and has other things to do before it needs
+the largest: `compile_beside` has those compiled meanwhile, by a process for each of `PARTS`.
 """
 
 from __future__ import annotations
 
+import atexit
+import os
+import sys
 from dataclasses import replace
+from subprocess import DEVNULL, Popen
 
 import cv2
 import numpy as np
 
+from .base import installation, kernel_files
+from .base.arrays import frozen
+from .base.camera import Camera
 from .base.progress import silent
+from .base.threads import core_count
 from .deform.puppet import Puppet, puppet_of
-from .document.model import DeformSettings, Document, EditObject, Placement
+from .document.gaussians import Gaussians
+from .document.model import (
+    DeformSettings,
+    Document,
+    EditObject,
+    LiftedObject,
+    PhotoTexture,
+    Placement,
+)
+from .raster import tiles
+from .raster.posed import PosedSplats, RestSplats
+from .raster.rules import SPAN
+from .raster.surface import draw_layers
+from .raster.texture import build_levels
 
 SIZE = 96  # px
 NODES = 8  # unknowns of a made system
@@ -130,5 +154,67 @@ def _register(document: Document, thing: EditObject) -> None:
     place_import(scene, gaussians, registrar.rated(thing.lifted.world_from_object))
 
 
+def compile_beside() -> bool:
+    """Has the largest kernels compiled by other processes; whether there is anything to compile.
+
+    Whoever needs one of them waits for it (`kernel_files`). An installer's copy does it in another
+    way, at its first start.
+    """
+    if installation.is_frozen() or kernel_files.is_kept(draw_layers):
+        return False
+    if core_count() > 1:
+        path = os.pathsep.join(filter(None, sys.path))
+        for name, (_, modules) in PARTS.items():
+            process = Popen(
+                [sys.executable, "-m", __name__, name], env=os.environ | {"PYTHONPATH": path},
+                stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL,
+            )  # fmt: skip
+            atexit.register(process.kill)  # of an edit that ended before
+            kernel_files.elsewhere |= dict.fromkeys(modules, process)
+    return True
+
+
+def _draw() -> None:
+    """Draws nothing, so that nothing has to be projected."""
+    splats, camera = _speck(), Camera.from_fov(SIZE, SIZE)
+    pixels = np.ones((SIZE, SIZE), np.float32)
+    texture = build_levels(np.stack([pixels] * 3, -1), pixels, 0, 0)
+    nothing = frozen(np.zeros((len(splats), SPAN), np.float32))
+    tiles.draw(tiles.Drawable(splats, nothing, None, camera, camera), texture)
+
+
+def _project() -> None:
+    camera = Camera.from_fov(SIZE, SIZE)
+    tiles.prepare(_speck(), camera, camera)
+
+
+def _fill() -> None:
+    from .pipeline import make_plate
+
+    pixels = np.random.default_rng(0).integers(0, 255, (SIZE, SIZE, 3), np.uint8)
+    mask = np.zeros((SIZE, SIZE), bool)
+    mask[SIZE // 3 : SIZE // 2, SIZE // 3 : SIZE // 2] = True
+    make_plate(pixels, mask)
+
+
+# What is compiled beside an edit, and the modules whose kernels that are.
+PARTS = {
+    "draw": (_draw, ("surface", "binning")),
+    "project": (_project, ("projection",)),
+    "fill": (_fill, ("patch_search", "patch_detail")),
+}
+
+
+def _speck() -> PosedSplats:
+    """One Gaussian that shows the photo."""
+    one, row = np.ones(1), np.ones((1, 3))
+    gaussians = Gaussians(0 * row, np.array([[1.0, 0, 0, 0]]), 0.1 * row, one, row)  # pyright: ignore
+    texture = PhotoTexture(SIZE / 2 * row[:, :2], one, one)  # pyright: ignore
+    place = np.eye(4)
+    place[2, 3] = 3.0
+    lifted = LiftedObject(gaussians, texture, 0 * row, place, 0.1, "made")  # pyright: ignore
+    return PosedSplats(RestSplats(lifted, Camera.from_fov(SIZE, SIZE)), None, np.eye(4))
+
+
 if __name__ == "__main__":
-    warm_up()
+    PARTS[sys.argv[1]][0]() if sys.argv[1:] else warm_up()

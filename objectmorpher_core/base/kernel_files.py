@@ -6,7 +6,8 @@ number, and the list may then name one variant while the file holds the other: w
 code for other arrays than it was given, and writes past their ends. Here the name is of the variant
 itself; of two that write at once one entry of the list may be lost, and is compiled again.
 
-Every module with kernels takes `numba` from here.
+Every module with kernels takes `numba` from here. What only kernels call gets no way in from
+Python: that was a fifth of the time that compiling takes.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ import hashlib
 import os
 from functools import cache
 from pathlib import Path
+from subprocess import Popen
 from typing import Any
 
-import numba
+import numba as _numba
 from numba.core import caching, config
 
 from .installation import inside, written_build
@@ -77,8 +79,6 @@ def _scratch() -> Path:
     return folder
 
 
-__all__ = ["numba"]
-
 DIGITS = 16  # hexadecimal, of the name's hash
 
 
@@ -96,5 +96,42 @@ def _digest(*parts: Any) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:DIGITS]
 
 
+def is_kept(kernel: Any) -> bool:
+    """Whether a variant of the kernel as it is now lies on the disk, or none ever will."""
+    kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    return kept is None or bool(kept._load_index())
+
+
+# By the names of modules: the processes that are compiling their kernels just now.
+elsewhere: dict[str, Popen[bytes]] = {}
+
+
+def _load(self: Any, key: Any) -> Any:
+    """What is kept under `key`, or None. What another process is compiling is waited for."""
+    found = _load_now(self, key)
+    if found is None and (process := elsewhere.get(self._index_name.partition(".")[0])):
+        process.wait()
+        found = _load_now(self, key)
+    return found
+
+
 files: Any = caching.IndexDataCacheFile
-files.save = _save
+_load_now = files.load
+files.save, files.load = _save, _load
+
+
+class _Kernels:
+    """What modules with kernels know as `numba`."""
+
+    @staticmethod
+    def njit(**options: Any) -> Any:
+        """`numba.njit`. Python must not call kernels that leave open whether they are kept.
+
+        It would jump to nowhere; a test looks for such calls.
+        """
+        if "cache" not in options:
+            options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        return _numba.njit(**options)
+
+
+numba: Any = _Kernels

@@ -1,4 +1,4 @@
-"""The one place where onnxruntime is imported: with its telemetry off.
+"""The one place where onnxruntime is imported: with its telemetry off, on the best device.
 
 From 1.29 on its official builds write a device's number and a queue of events (names of models,
 hardware) beneath the user's cache and send them home. The variable is read once, when the library
@@ -9,6 +9,7 @@ https://github.com/microsoft/onnxruntime/blob/main/docs/Privacy.md
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -16,13 +17,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from .device import DEVICE
+
+log = logging.getLogger(__name__)
+
 # Gives an ONNX file other inputs and outputs, without the `onnx` package.
 #
-# A file is one protobuf message: ModelProto.graph is field 7, and GraphProto's input, output and
-# value_info are fields 11, 12 and 13 (onnx.proto3, IR version 3 and later). We copy everything else
-# as it is. onnxruntime then infers the shapes anew and drops the nodes that nothing needs.
+# A file is one protobuf message: ModelProto.graph is field 7, and GraphProto's node, initializer,
+# input, output and value_info are fields 1, 5, 11, 12 and 13 (onnx.proto3, IR version 3 and later).
+# onnxruntime infers the shapes anew, but computes every node of a graph whatever is asked of it: we
+# leave out the nodes and weights that the outputs do not need, and copy everything else as it is.
 
-GRAPH, INPUT, OUTPUT, VALUE_INFO = 7, 11, 12, 13  # field numbers
+GRAPH, NODE, INITIALIZER, INPUT, OUTPUT, VALUE_INFO = 7, 1, 5, 11, 12, 13  # field numbers
+TENSOR_NAME = 8  # of an initializer
+NODE_INPUT, NODE_OUTPUT = 1, 2  # of a node
 VARINT, EIGHT_BYTES, BYTES, FOUR_BYTES = 0, 1, 2, 5  # wire types
 FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type = FLOAT
 
@@ -31,6 +39,7 @@ def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
     """`model` with the one input `images`, (n, c, h, w) of any size, and the `outputs`.
 
     `images` is the name of the model's input, `outputs` are those of any tensors inside: float32.
+    What they do not need is left out.
     """
     sizes = b"".join(bytes_field(1, bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
     tensor = bytes_field(1, FLOAT + bytes_field(2, sizes))
@@ -40,14 +49,36 @@ def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
         if number != GRAPH:
             parts.append(view[start:end])
             continue
-        graph = view[payload:end]
-        body: list[bytes | memoryview] = [
-            graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
-        ]
+        body = _needed(view[payload:end], outputs)
         body.append(bytes_field(INPUT, bytes_field(1, images.encode()) + bytes_field(2, tensor)))
         body += [bytes_field(OUTPUT, bytes_field(1, name.encode())) for name in outputs]
         parts += [_head(GRAPH, sum(map(len, body))), *body]
     return b"".join(parts)  # the weights are copied here, once
+
+
+def _needed(graph: memoryview, outputs: tuple[str, ...]) -> list[bytes | memoryview]:
+    """The fields of a graph without its interface, and without what the `outputs` do not need."""
+    fields = [f for f in _fields(graph) if f[0] not in (INPUT, OUTPUT, VALUE_INFO)]
+    wanted = {name.encode() for name in outputs}
+    kept: set[int] = set()
+    for number, start, payload, end in reversed(fields):  # nodes stand after those they need
+        if number != NODE:
+            continue
+        node = graph[payload:end]
+        if wanted & _texts(node, NODE_OUTPUT):
+            kept.add(start)
+            wanted |= _texts(node, NODE_INPUT)
+    return [
+        graph[start:end]
+        for number, start, payload, end in fields
+        if (number != NODE or start in kept)
+        and (number != INITIALIZER or wanted & _texts(graph[payload:end], TENSOR_NAME))
+    ]
+
+
+def _texts(message: memoryview, wanted: int) -> set[bytes]:
+    """The texts of the field `wanted` of a message."""
+    return {bytes(message[a:b]) for number, _, a, b in _fields(message) if number == wanted}
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int, int, int]]:
@@ -106,18 +137,81 @@ WATCH_EVERY = 0.02  # s
 
 
 def open_session(network: Path | bytes, threads: int = 0, is_foreign: bool = False) -> Any:
-    """An `onnxruntime.InferenceSession` of a file or of its bytes, on the CPU. Costly.
+    """An `onnxruntime.InferenceSession` of a file or of its bytes, or a stand-in. Costly.
 
+    It runs on the GPU where the installed onnxruntime can use one, and otherwise on the CPU, with
     `threads` of one run; 0: one a core. Of a foreign file, warnings go unsaid. Raises
     onnxruntime's own kinds of exception.
     """
     onnxruntime = _runtime()
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads
-    if is_foreign:
-        options.log_severity_level = 3
-    model = network if isinstance(network, bytes) else str(network)
-    return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+
+    def opened(provider: str, how: dict[str, str]) -> Any:
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads
+        if is_foreign or provider != CPU:
+            options.log_severity_level = 3
+        if provider == "DmlExecutionProvider":
+            options.enable_mem_pattern = False  # which it cannot have
+        providers = [(provider, how), (CPU, {})] if provider != CPU else [CPU]
+        model = network if isinstance(network, bytes) else str(network)
+        return onnxruntime.InferenceSession(model, options, providers=providers, enable_fallback=0)
+
+    provider = chosen_provider(onnxruntime.get_available_providers())
+    if provider == CPU:
+        return opened(CPU, {})
+    return _OnGpu(provider, lambda name: opened(name, PROVIDERS.get(name, {})))
+
+
+CPU = "CPUExecutionProvider"
+# Those of GPUs, the quickest first, with what keeps their numbers like the CPU's.
+PROVIDERS = {
+    "CUDAExecutionProvider": {"use_tf32": "0"},
+    "DmlExecutionProvider": {},
+    "CoreMLExecutionProvider": {"ModelFormat": "MLProgram", "MLComputeUnits": "CPUAndGPU"},
+}
+_useless: set[str] = set()  # providers that have failed in this process
+
+
+def chosen_provider(available: list[str]) -> str:
+    """What a network runs on, of onnxruntime's providers that are `available`.
+
+    The CPU where the environment asks for it, as it does for PyTorch.
+    """
+    if os.environ.get(DEVICE) == "cpu":
+        return CPU
+    usable = (p for p in PROVIDERS if p in available and p not in _useless)
+    return next(usable, CPU)
+
+
+class _OnGpu:
+    """A session that goes on on the CPU where the GPU fails: its driver is missing, it is full."""
+
+    def __init__(self, provider: str, opened: Callable[[str], Any]) -> None:
+        self._provider, self._opened = provider, opened
+        try:
+            self._session = opened(provider)
+        except Exception as error:
+            self._give_up(error)
+
+    def run(self, outputs: list[str] | None, inputs: dict[str, Any], options: Any = None) -> Any:
+        """As onnxruntime's; what was ended on purpose is not tried again."""
+        try:
+            return self._session.run(outputs, inputs, options)
+        except Exception as error:
+            if self._provider == CPU or (options is not None and options.terminate):
+                raise
+            self._give_up(error)
+            return self._session.run(outputs, inputs, options)
+
+    def _give_up(self, error: Exception) -> None:
+        if self._provider not in _useless:
+            log.info("Networks run on the CPU: %s failed: %s", self._provider, error)
+        _useless.add(self._provider)
+        self._provider = CPU
+        self._session = self._opened(CPU)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._session, name)
 
 
 def run_session(

@@ -159,14 +159,14 @@ def limits_of(rules, kind, gap, texture_gap):
     )  # fmt: skip
 
 
-@numba.njit(nogil=True)
+@numba.njit(cache=False, nogil=True)
 def ramp(value, zero, one):
     """0 at `zero`, 1 at `one`, smooth between and constant beyond (either may be larger)."""
     t = min(max((value - zero) / (one - zero), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-@numba.njit(nogil=True)
+@numba.njit(cache=False, nogil=True)
 def facing_weight(cosine, is_seen, solidity, rules, is_surface=True, is_edged=False):
     """Weight of a Gaussian whose normal makes this cosine with the way to the camera.
 
@@ -181,7 +181,7 @@ def facing_weight(cosine, is_seen, solidity, rules, is_surface=True, is_edged=Fa
     return solidity * front + (1.0 - solidity) * brim
 
 
-@numba.njit(nogil=True, error_model="numpy")
+@numba.njit(cache=False, nogil=True, error_model="numpy")
 def coverage(total, slope, rules):
     """Share of a pixel that is inside the surface whose kernel sum is `total`; of 32 bits.
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from threading import Lock
 from typing import Any
 
+import cv2
 import numpy as np
 
 from .. import models
 from ..base.arrays import F32, RGB
 from ..base.progress import Progress, silent
+from ..models.ahead import Ahead
 from ..models.onnx_session import open_session, run_session
-from .subject import DEVIATION, MEAN
+from .salience import DEVIATION, MEAN
 
 WEIGHT = "dinov2-vits14"
 IMAGES = "input_image"
@@ -21,6 +24,8 @@ TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the clas
 # one layer: 2 0.31, 5 0.44, 8 0.46, 10 0.40, the last 0.37); the last tells what things are.
 INNER = tuple(f"/backbone/encoder/layer.{k}/Add_1_output_0" for k in (5, 8))
 PATCH = 14  # px
+PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
+SMALLEST_PATCH = 4  # px of the photo; finer ones would only see the enlargement's blur
 
 
 class TokenNet:
@@ -54,6 +59,29 @@ class TokenNet:
         return [np.asarray(f[0, 1:].reshape(height, width, -1), np.float32) for f in found]
 
 
+def photo_tokens(rgb: RGB, patches: int, progress: Progress = silent) -> F32:
+    """(h, w, 384) of about so many patches of a photo (H, W, 3)."""
+    small = _reduced(rgb, patches)
+    watch = lambda: progress(0.5, "recognising its parts")  # noqa: E731
+    return _ahead.answer(small, lambda: shared().tokens(small, progress), watch)
+
+
+def expect_tokens(rgb: RGB) -> Callable[[], None]:
+    """Who asks for the tokens of a whole photo waits for what is returned, which computes them."""
+    small = _reduced(rgb, PATCHES)
+    return _ahead.expect(small, lambda: shared().tokens(small))
+
+
+def _reduced(rgb: RGB, patches: int) -> RGB:
+    """The photo at the size at which it has so many patches."""
+    height, width = rgb.shape[:2]
+    scale = min((patches / (height * width)) ** 0.5, 1 / SMALLEST_PATCH)
+    h, w = max(1, round(height * scale)), max(1, round(width * scale))
+    how = cv2.INTER_AREA if h * PATCH < height else cv2.INTER_CUBIC
+    return np.asarray(cv2.resize(rgb, (w * PATCH, h * PATCH), interpolation=how), np.uint8)
+
+
+_ahead: Ahead[F32] = Ahead()
 _opening = Lock()
 
 

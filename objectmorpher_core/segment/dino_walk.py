@@ -8,27 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import cv2
-import numpy as np
-
 from .. import models
 from ..base.arrays import F32, RGB, Mask
 from ..base.progress import Progress, part, silent
 from ..document.model import Prompt
 from . import Found
-from .dino_tokens import PATCH, WEIGHT, shared
+from .dino_tokens import PATCHES, WEIGHT, photo_tokens
 from .matting.edges import rehearse
 from .pieces.features import main_directions
 from .pieces.pieces import Pieces
 from .pieces.view import PhotoView, PromptAnswer, Tokens
+from .salience import SubjectNet
 from .selection import SelectionError, check_mask, check_prompt, free_mask, is_bounded
-from .subject import SubjectNet
 
 Look = Callable[[PhotoView, Prompt, Progress], PromptAnswer]
 
-PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
 TILE_PATCHES = 900  # of a tile of a large photo
-SMALLEST_PATCH = 4  # px of the photo; finer ones would only see the enlargement's blur
 
 
 class DinoWalk:
@@ -111,13 +106,4 @@ class DinoWalk:
 
     def _tokens(self, rgb: RGB, patches: int, progress: Progress) -> F32:
         """(h, w, 64) for a photo (H, W, 3)."""
-        height, width = rgb.shape[:2]
-        scale = min((patches / (height * width)) ** 0.5, 1 / SMALLEST_PATCH)
-        h, w = max(1, round(height * scale)), max(1, round(width * scale))
-        shrinks = h * PATCH < height
-        small = cv2.resize(
-            rgb,
-            (w * PATCH, h * PATCH),
-            interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC,
-        )
-        return main_directions(shared().tokens(np.asarray(small, np.uint8), progress))
+        return main_directions(photo_tokens(rgb, patches, progress))

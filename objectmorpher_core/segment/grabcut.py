@@ -10,8 +10,8 @@ from ..base.progress import Progress, silent
 from ..document.model import Prompt
 from .choice import guess
 from .matting.edges import cut
+from .salience import SubjectNet
 from .selection import SelectionError, at_level, check_prompt, free_mask
-from .subject import SubjectNet
 from .walk import Walk
 
 CELLS = 4000  # of a photo

@@ -1,25 +1,18 @@
-"""The photo's salient subject: U^2-Net-p (Qin et al. 2020, "U^2-Net", arXiv 2005.09007)."""
+"""The photo's salient subject, as the network of `salience` sees it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 
-from .. import models
 from ..base.arrays import F32, RGB, Mask
 from ..base.progress import Progress, part, silent
 from ..document.model import Prompt
-from ..models.onnx_session import open_session
 from .matting.edges import cut
+from .salience import SubjectNet
 from .selection import SelectionError, check_prompt, free_mask
-
-WEIGHT = "u2netp"
-INPUT_SIDE = 320  # px, as it was trained
-MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # ImageNet's RGB, as it was trained
-DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,35 +20,6 @@ class SubjectMap:
     """The degree to which each place of a photo belongs to its subject."""
 
     salience: F32  # (320, 320) in [0, 1], the photo stretched to a square
-
-
-class SubjectNet:
-    """The network, loaded at its first use."""
-
-    def __init__(self) -> None:
-        self._session: Any = None
-
-    def missing(self) -> str | None:
-        """Why it cannot run, or None."""
-        if models.path(WEIGHT) is None:
-            return f"the model {WEIGHT} is not here: `objectmorpher models get {WEIGHT}`"
-        return None
-
-    def salience(self, rgb: RGB) -> F32:
-        """(320, 320) in [0, 1] for a photo (H, W, 3)."""
-        if self._session is None:
-            path = models.path(WEIGHT)
-            if path is None:
-                raise models.ModelError(
-                    f"the model {WEIGHT} is not here: `objectmorpher models get`"
-                )
-            self._session = open_session(path)
-        small = cv2.resize(rgb, (INPUT_SIDE, INPUT_SIDE), interpolation=cv2.INTER_AREA)
-        scaled = small.astype(np.float32) / max(int(small.max()), 1)  # as it was trained
-        pixels = ((scaled - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
-        session = self._session
-        first = session.run([session.get_outputs()[0].name], {session.get_inputs()[0].name: pixels})
-        return np.ascontiguousarray(first[0][0, 0], np.float32)
 
 
 class SubjectSegmenter:

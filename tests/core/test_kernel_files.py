@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 from typing import Any
 
 from numba.core import caching
 
 from objectmorpher_core.base import kernel_files  # noqa: F401  (names the files)
+from tests.tree import parsed
 
 ROOT = Path(__file__).parents[2]
 Files: Any = caching.IndexDataCacheFile
@@ -47,3 +49,43 @@ def test_no_kernel_is_kept_otherwise() -> None:
             is_here = path.name == "kernel_files.py"
             lines = path.read_text(encoding="utf-8").splitlines()
             assert is_here or "import numba" not in lines, path
+
+
+def options_of(function: ast.FunctionDef) -> set[str | None] | None:
+    """The options of a kernel; None for what is none."""
+    for mark in function.decorator_list:
+        if isinstance(mark, ast.Call) and ast.unparse(mark.func) == "numba.njit":
+            return {keyword.arg for keyword in mark.keywords}
+    return None
+
+
+def test_python_calls_no_kernel_that_has_no_way_in() -> None:
+    """It would end the process."""
+    folders = ("objectmorpher_core", "app", "research", "tests", "docs")
+    trees = {p: parsed(p) for name in folders for p in sorted((ROOT / name).rglob("*.py"))}
+    kernels = {
+        (path.stem, item.name): options
+        for path, tree in trees.items() for item in ast.walk(tree)
+        if isinstance(item, ast.FunctionDef) and (options := options_of(item)) is not None
+    }  # fmt: skip
+    hidden = {place for place, options in kernels.items() if "cache" not in options}
+    assert len(hidden) > 50
+    for path, tree in trees.items():
+        compiled = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and options_of(n)]
+        inside = {id(n) for function in compiled for n in ast.walk(function)}
+        known = {name: (path.stem, name) for stem, name in hidden if stem == path.stem}
+        modules = {}
+        for item in ast.walk(tree):
+            if isinstance(item, ast.ImportFrom):
+                stem = (item.module or "").rpartition(".")[2]
+                known |= {a.asname or a.name: (stem, a.name) for a in item.names}
+                modules |= {a.asname or a.name: a.name for a in item.names}
+        for item in ast.walk(tree):
+            if id(item) in inside or not isinstance(item, ast.Name | ast.Attribute):
+                continue
+            place = ("", "")
+            if isinstance(item, ast.Name):
+                place = known.get(item.id, place)
+            elif isinstance(item.value, ast.Name):
+                place = (modules.get(item.value.id, ""), item.attr)
+            assert place not in hidden, f"{path}:{item.lineno}: {place[1]}"

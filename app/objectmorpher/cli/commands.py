@@ -110,6 +110,7 @@ LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 def run_edit(options: argparse.Namespace) -> None:
     """`objectmorpher edit`"""
     items = _items(options)
+    _compile_beside()
     scripts = [s for i in items for s in (i.script, *(o.script for o in i.others.objects))]
     named = [name for s in scripts for name in files_of(s)]
     inputs = [Path(name) for name in (*(i.photo for i in items), *named, options.script) if name]
@@ -133,6 +134,14 @@ def run_edit(options: argparse.Namespace) -> None:
         lines.append(line)
     write_all(outputs)
     sys.stdout.write("".join(f"{line}\n" for line in lines))
+
+
+def _compile_beside() -> None:
+    """Of the first edit after an installation most is compiling: say so, and use all cores."""
+    from objectmorpher_core.warm_up import compile_beside
+
+    if compile_beside():
+        sys.stderr.write(f"{PROGRAM}: compiling for this processor, once: about a minute more\n")
 
 
 def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) -> Edited:

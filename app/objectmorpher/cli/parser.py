@@ -491,7 +491,8 @@ def _on_photo(
     def run(options: argparse.Namespace) -> None:
         from ..system.early_network import open_early
 
-        open_early(options.photo, options.segment)
+        is_seen = bool(options.click or options.box or options.subject) and not options.mask
+        open_early(options.photo, options.segment, is_seen)
         assert command.run is not None
         command.run(options)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.arrays import F32, RGB, Mask
 from ...document.settings import Hint
-from ...segment.subject import SubjectNet
+from ...segment.salience import SubjectNet
 from .structure_lines import Line, draw_lines
 
 # What is known about where the parts of a fill come from, besides what they look like.

@@ -16,6 +16,7 @@ from ...base.progress import Progress, part, silent
 from ...document.model import Click, Prompt
 from ...models import HubModel, ModelError
 from ...models.hub import EXTRA
+from ..salience import SubjectNet
 from ..selection import (
     SelectionError,
     at_level,
@@ -25,7 +26,7 @@ from ..selection import (
     free_mask,
     keep_touched,
 )
-from ..subject import SubjectNet, subject_guess
+from ..subject import subject_guess
 from .view import Box, Encoded, SamAnswer, SamFrame, SamNetwork, SamView, inside_box
 
 WITHOUT_GPU = 110  # millions of parameters; a larger SAM takes minutes a photo on a CPU

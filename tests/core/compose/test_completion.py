@@ -18,7 +18,7 @@ from objectmorpher_core.compose.plate.plate import build_plate, plate_cover, pla
 from objectmorpher_core.compose.plate.sources import SUBJECT_COST, strange, unlikely
 from objectmorpher_core.compose.plate.structure_lines import draw_lines, find_lines
 from objectmorpher_core.document.settings import Hint
-from objectmorpher_core.segment.subject import SubjectNet
+from objectmorpher_core.segment.salience import SubjectNet
 from tests import focussed
 from tests.tree import quick
 
