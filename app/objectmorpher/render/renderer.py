@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 
 from objectmorpher_core.base.arrays import U8
+from objectmorpher_core.document.settings import NORMAL
 
 from ..canvas.layer import CanvasLayer
 from ..canvas.memo import same
@@ -71,7 +72,9 @@ def _is_plain(scene: Scene) -> bool:
     if scene.objects or scene.paper is not None or scene.split > 0 or scene.veil > 0:
         return False
     layers = scene.shades + scene.layers
-    return not any(layer.is_tint or layer.invented is not None for layer in layers)
+    return not any(
+        layer.is_tint or layer.invented is not None or layer.mode != NORMAL for layer in layers
+    )
 
 
 # The window's last picture below the interface: copied as long as nothing of it changes.
@@ -215,8 +218,8 @@ class Renderer:
                 continue
             picture = self._render(item, view)
             if picture is not None:
-                if item.blur > 0 and not item.is_marked:
-                    picture = self._defocus_pass.draw(picture, item.blur * view.zoom)
+                if not item.is_marked:
+                    picture = self._defocus_pass.draw(picture, item, view.zoom)
                 self._use(viewport)
                 self._blend.use(scene)
                 self._layer_pass.draw_picture(picture, item, scene, view)

@@ -14,11 +14,12 @@ from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Placement
-from objectmorpher_core.document.settings import Finish, Shadow
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.settings import MODES, Finish, Shadow
 from objectmorpher_core.pipeline import make_plate
 from tests import focussed, shapes
 from tests.app.render.pictures import make_renderer, specified
+from tests.tree import over
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
 
@@ -150,6 +151,39 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     turned = composite(edits.set_relight(document, 0, 0.0)).pixels.astype(np.float32) / 255
     assert np.abs(turned - exported).max() > 3 * PIXEL  # that stays while it turns
     assert np.abs(window - exported).mean() <= PIXEL
+
+
+@over("finish", [Finish(0.8, 0.2, blend_mode=mode) for mode in MODES] + [
+    Finish(sharpness=1.5), Finish(blur=1.5), Finish(0.9, blur=0.7, sharpness=2.0),
+])  # fmt: skip
+@over("kind", ["tiles", "gl"])
+def test_the_window_shows_an_objects_finish_as_it_is_exported(renderer, kind, finish):
+    document = shapes.scene("ellipse", 800).document()
+    copy = replace(document.objects[0], name="Copy", placement=Placement(move=(24.0, 7.0)))
+    document = replace(document, objects=(*document.objects, copy))
+    document = edits.set_finish(document, 1, finish)
+    plain = composite(edits.set_finish(document, 1, Finish())).pixels.astype(np.float32) / 255
+    window, exported = _as_shown(renderer, document, kind), composite(document).pixels / 255
+    inside = np.abs(exported - plain).max(2) > PIXEL
+    assert finish.blend_mode == "normal" or inside.mean() > 0.1
+    assert np.abs(window - exported).mean() <= PIXEL
+    assert np.abs(window - exported)[inside].mean() <= PIXEL
+
+
+def _as_shown(renderer, document: Document, kind: str) -> np.ndarray:
+    """The photo px for px in the window."""
+    cache, view = Cache(), _view()
+    cache.frame_time = np.inf
+    view.set_zoom(1.0, (80, 60), SIZE)
+    view.left = view.top = 0.0
+    frame = build_frame(document, view, cache, renderer=kind)
+    layers = frame.layers if kind == "tiles" else ()
+    objects = splat_objects(document, frame) if kind == "gl" else ()
+    shown = Scene(
+        document.photo.pixels, (0.0, 0.0, 0.0), frame.plate,
+        frame.shades, layers, objects, blend=frame.blend,
+    )  # fmt: skip
+    return _window_picture(renderer, shown, view)
 
 
 @pytest.mark.parametrize("zoom", [1.0, 0.5])

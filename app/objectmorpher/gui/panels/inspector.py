@@ -8,11 +8,11 @@ from imgui_bundle import ImVec2, imgui
 
 from ...commands import COMMANDS, keys_of, next_step, run, why_not
 from ...editor.editor import Editor
-from ...editor.view import ToolName
+from ...editor.view import CHANGING, ToolName
 from ...system.texts import t
 from ..widgets.panes import INSPECTOR, edge, pane
 from ..widgets.theme import FOLDED, PRIMARY, Icon, theme
-from ..widgets.widgets import Emphasis, button, icon_button, rule
+from ..widgets.widgets import Emphasis, button, command_button, icon_button, note, rule
 from ..window.layout import Rect
 from .compose import draw_compose
 from .history_list import draw_history
@@ -45,7 +45,11 @@ def draw_inspector(editor: Editor, rect: Rect) -> None:
         imgui.begin_child("##scroll", size, imgui.ChildFlags_.nav_flattened)
         draw_objects(editor)
         rule()
-        _PANELS[editor.view.tool](editor)
+        if editor.object is not None and editor.object.is_locked and editor.view.tool in CHANGING:
+            note(t("{name} is locked.", name=editor.object.name))
+            command_button(editor, "lock", t("Unlock"))
+        else:
+            _PANELS[editor.view.tool](editor)
         draw_history(editor)
         _scroll.is_needed = imgui.get_scroll_max_y() > 0
         imgui.end_child()
