@@ -66,9 +66,9 @@ def draw_compose(editor: Editor) -> None:
     if not editor.is_lifted:
         note(t("Lift an object first."))
         return
-    _draw_finish(editor)  # first: what it changes adds fields below
-    rule()
     _draw_background(editor)
+    rule()
+    _draw_finish(editor)  # before those to which it adds fields
     rule()
     _draw_shadow(editor)
     rule()

@@ -22,6 +22,8 @@ from .place import draw_place
 from .pose import draw_pose
 from .select import draw_mask, draw_select
 
+NEXT = 176.0  # points, width of the next step's button over the photo
+
 
 class _Scroll:
     """Whether the panel had more than there is room for when it was drawn last."""
@@ -66,6 +68,25 @@ def _draw_folded(editor: Editor, rect: Rect) -> None:
         if icon_button(Icon.SPLIT, "panel", hint, None, FOLDED - 4):
             run(editor, "panel")
         edge((rect.x + 0.5, rect.y), (rect.x + 0.5, rect.y + rect.height))
+    _draw_next(editor, rect)
+
+
+def _draw_next(editor: Editor, rect: Rect) -> None:
+    """The next step over the photo's corner, beside the folded panel."""
+    label, command = next_step(editor)
+    if command is None or editor.hand.is_busy or editor.view.is_before:
+        return
+    corner = ImVec2(rect.x - theme.pt(16), rect.y + rect.height - theme.pt(16))
+    imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(1.0, 1.0))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
+    flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_background
+    imgui.begin("##next", None, flags | imgui.WindowFlags_.no_bring_to_front_on_focus)
+    if button(label, Emphasis.PRIMARY, why_not(editor, command), NEXT):
+        run(editor, command)
+    imgui.end()
+    imgui.pop_style_var()
 
 
 def _draw_foot(editor: Editor, rect: Rect, foot: float) -> None:

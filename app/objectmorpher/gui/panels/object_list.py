@@ -54,7 +54,8 @@ def draw_objects(editor: Editor) -> None:
     shown = editor.objects.listed()
     _draw_title(editor, has_buttons=bool(shown))
     if not shown:
-        note(t("Click something in the photo."))
+        is_asked = editor.selection.pending is not None
+        note(t("Looking for what you clicked…") if is_asked else t("Click something in the photo."))
     top = imgui.get_cursor_screen_pos()
     for k in shown:
         _draw_object(editor, k)
@@ -111,7 +112,7 @@ def _draw_object(editor: Editor, k: int) -> None:
         _draw_name(thing.name, thing.is_visible, ImVec2(start.x + theme.pt(NAME), middle), room)
     if thing.lifted is not None:
         is_near = imgui.is_mouse_hovering_rect(start, end)
-        if thing.is_locked or is_current or is_near:
+        if thing.is_locked or is_near:
             imgui.set_cursor_screen_pos(
                 ImVec2(end.x - theme.pt(2 * EYE - 4), start.y + theme.pt(2))
             )
