@@ -157,7 +157,10 @@ class EditorState:
             is_locked = not document.objects[k].is_locked
             label = t("Lock object") if is_locked else t("Unlock object")
             self.apply(label, lock_edits.set_locked(document, k, is_locked))
-            self.message = None
+            if is_locked:
+                self.say_locked(k)
+            else:
+                self.say(t("It can be changed again"))
 
     def commit(self, label: str) -> None:
         """The preview becomes a step; without a label it is dropped."""
