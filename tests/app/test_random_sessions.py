@@ -88,8 +88,9 @@ class Artist:
 
     def place(self) -> None:
         move = self.random.uniform(-25, 25, 2)
-        turn = tuple(float(angle) for angle in self.random.uniform(-20, 20, 3))
-        self.editor.placing.move_to(Placement((float(move[0]), float(move[1])), 0.1, turn, 1.05))
+        yaw, pitch, roll = (float(angle) for angle in self.random.uniform(-20, 20, 3))
+        there = Placement((float(move[0]), float(move[1])), 0.1, (yaw, pitch, roll), 1.05)
+        self.editor.placing.move_to(there)
         self.editor.commit("Move object")
 
     def drag(self) -> None:
@@ -118,10 +119,10 @@ class Artist:
             self.pose(at, at + 9.0, at)
             self.is_unmoved(before)
 
-    def quietly(self, place: np.ndarray | None, **held: bool) -> None:
+    def quietly(self, place: np.ndarray | None, alt: bool = False) -> None:
         before = self.places()
         if place is not None:
-            self.pose(place, **held)
+            self.pose(place, alt=alt)
         self.is_unmoved(before)
 
     def remove(self) -> None:
@@ -206,7 +207,7 @@ class Artist:
         assert document is not None
         scene = build_scene(self.editor, "tiles")
         moved = [o for o in document.objects if o.is_moved]
-        assert scene.plate is not None and scene.blend is not None
+        assert scene is not None and scene.plate is not None and scene.blend is not None
         assert scene.veil == 0 and scene.paper is None
         assert len(scene.layers) >= len(moved) and not self.editor.view.is_before
 
@@ -271,17 +272,20 @@ class Artist:
             self.editor.posing.select(self.some(count))
         return count > 0
 
-    def pose(self, *places: np.ndarray, button: Button = Button.LEFT, **held: bool) -> None:
+    def pose(self, *places: np.ndarray, button: Button = Button.LEFT, alt: bool = False) -> None:
         self.editor.choose_tool(ToolName.POSE)
-        stroke(self.editor, POSE, *places, button=button, **held)
+        stroke(self.editor, POSE, *places, button=button, alt=alt)
 
 
 def is_kept(before: Document, old: EditObject, new: EditObject, editor: Editor) -> None:
     """Pose, place and handles of what is still there."""
     assert old.lifted is not None and new.lifted is not None and editor.document is not None
     camera = before.photo.camera
-    motions = [o.placement.matrix(o.lifted, camera) for o in (old, new)]
-    np.testing.assert_allclose(*motions, atol=1e-9)
+    was_placed, is_placed = (
+        placement.matrix(lifted, camera)
+        for placement, lifted in ((old.placement, old.lifted), (new.placement, new.lifted))
+    )
+    np.testing.assert_allclose(was_placed, is_placed, atol=1e-9)
     known = {tuple(h.point): h for h in old.handles}
     for handle in new.handles:  # on what they hold, which a soft one has not taken to its target
         own = known[tuple(handle.point)]
@@ -289,7 +293,8 @@ def is_kept(before: Document, old: EditObject, new: EditObject, editor: Editor) 
         if own.softness == 0:
             reach = 500 / old.lifted.diameter
             assert np.abs(own.target - handle.target).max() * reach <= 1.0
-    gaps, same = KDTree(new.lifted.gaussians.means).query(old.lifted.gaussians.means)
+    found = KDTree(new.lifted.gaussians.means).query(old.lifted.gaussians.means)
+    gaps, same = map(np.asarray, found)
     still = gaps == 0
     assert still.mean() > 0.7
     was = camera.project(editor.derived.posed(before, 0).means[still])
