@@ -6,6 +6,11 @@ uniform ivec2 way;   // px, to the next one along the blur
 uniform int reach;   // px, where it ends
 uniform float blur;  // px, standard deviation
 
+#ifdef SHARPEN
+uniform sampler2D detailed;
+uniform float sharpness;
+#endif
+
 out vec4 color;
 
 void main() {
@@ -18,4 +23,9 @@ void main() {
         total += weight;
     }
     color /= total;
+#ifdef SHARPEN  // compose/light/defocus.py, `sharpened`
+    vec4 own = texelFetch(detailed, at, 0);
+    vec3 coarse = color.rgb * (own.a / max(color.a, 1e-6));
+    color = vec4(clamp(own.rgb + sharpness * (own.rgb - coarse), vec3(0), vec3(own.a)), own.a);
+#endif
 }

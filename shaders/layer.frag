@@ -29,6 +29,11 @@ out vec4 color;
 #include "hatch.glsl"
 #include "light.glsl"
 
+#ifdef MODE  // how it is mixed with what is there
+uniform sampler2D under;
+#include "modes.glsl"
+#endif
+
 #ifdef HAS_GRAIN
 #include "grain.glsl"
 #endif
@@ -52,8 +57,14 @@ void main() {
 #endif
     color.rgb = hatched(color.rgb, color.a, clamp(share / max(color.a, 1e-3), 0, 1), xy);
 #endif
-#ifdef HAS_BLEND
-    color *= texture(blend, xy / cells).r;
-#endif
     color *= opacity;
+    float shown = 1.0;
+#ifdef HAS_BLEND
+    shown = texture(blend, xy / cells).r;
+#endif
+#ifdef MODE
+    vec3 below = texelFetch(under, ivec2(gl_FragCoord.xy), 0).rgb;
+    color = vec4(mixed(below, color, MODE), 1.0);
+#endif
+    color *= shown;
 }

@@ -28,7 +28,10 @@ def command(picture, back):
 
 
 def layers(path):
-    """The layers of an OpenRaster file from below: name, left, top, whether shown, PNG file."""
+    """The layers of an OpenRaster file from below.
+
+    Of each its name, left, top, whether it is shown, how it is mixed, and its PNG file.
+    """
     found = []
     with zipfile.ZipFile(path) as archive:
         stack = ElementTree.fromstring(archive.read("stack.xml")).find("stack")
@@ -38,5 +41,6 @@ def layers(path):
                 raise ValueError(f"the layer {entry.get('name')} is too large")
             is_shown = entry.get("visibility", "visible") == "visible"
             place = int(entry.get("x", "0")), int(entry.get("y", "0"))
-            found.append((entry.get("name"), *place, is_shown, archive.read(source)))
+            how = entry.get("composite-op", "svg:src-over")
+            found.append((entry.get("name"), *place, is_shown, how, archive.read(source)))
     return found

@@ -37,10 +37,11 @@ from .blend import (
     with_touched,
 )
 from .blend import STILL as STILL
-from .light.defocus import blurred, reach_of
+from .light.defocus import DETAIL, blurred, reach_of, sharpened
 from .light.harmonize import lit, saturated
 from .light.lighting import NOTHING, Lighting, Lit
 from .light.lighting import object_texture as object_texture
+from .modes import mixed, over
 from .order import holes, leaves_a_hole, stack
 from .plate.plate import hole_margin, plate_crop, plate_of_holes
 from .shadow.shadow import Shade
@@ -229,9 +230,8 @@ class _Drawing:
         for k in range(len(self._things)):
             if (drawn := self._draw(k, top, bottom)) is not None:
                 picture = _part(drawn, 0, bottom - top)
-                result *= 1 - picture.alpha[..., None]
-                result[..., :3] += picture.color
-                result[..., 3] += picture.alpha
+                own = np.dstack([picture.color, picture.alpha])
+                result = over(result, own, self._things[k].look.mode)
         return result
 
     def _draw(self, k: int, top: int, bottom: int) -> Picture3D | None:
@@ -239,7 +239,7 @@ class _Drawing:
         if k not in self._drawables:
             return None
         look = self._things[k].look
-        picture = self._focussed(k, top, bottom, look.blur)
+        picture = self._focussed(k, top, bottom, look)
         color = lit(picture.color, picture.alpha, look.gain)
         if look.relit is not None:
             color = look.relit.lit(color, picture.alpha, self.box[0], top)
@@ -253,19 +253,21 @@ class _Drawing:
             from_photo=share * picture.from_photo,
         )  # fmt: skip
 
-    def _focussed(self, k: int, top: int, bottom: int, blur: float) -> Picture3D:
-        """The rows of an object's picture, as much out of focus as it is to be."""
+    def _focussed(self, k: int, top: int, bottom: int, look: Lit) -> Picture3D:
+        """The rows of an object's picture, as much out of focus or sharper as it is to be."""
         x0, y0, x1, y1 = self.box
-        if blur <= 0:
+        if look.blur <= 0 and look.sharpness <= 0:
             return tiles.draw(self._drawables[k], self._textures[k], (x0, top, x1, bottom))
         # By whole tiles more: what the rasteriser rounds, it rounds tile by tile.
-        rim = -(-reach_of(blur) // TILE) * TILE
+        reach = reach_of(look.blur) + (reach_of(DETAIL) if look.sharpness > 0 else 0)
+        rim = -(-reach // TILE) * TILE
         above, below = max(top - rim, y0), min(bottom + rim, y1)
         picture = tiles.draw(self._drawables[k], self._textures[k], (x0, above, x1, below))
         picture = _part(picture, 0, below - above)
+        color, alpha = blurred(picture.color, look.blur), blurred(picture.alpha, look.blur)
         soft = replace(
-            picture, color=blurred(picture.color, blur), alpha=blurred(picture.alpha, blur),
-            from_photo=blurred(picture.from_photo, blur),
+            picture, color=sharpened(color, alpha, look.sharpness, DETAIL), alpha=alpha,
+            from_photo=blurred(picture.from_photo, look.blur),
         )  # fmt: skip
         return _part(soft, top - above, bottom - above)
 
@@ -353,7 +355,7 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
         touched = own if touched is None else np.maximum(touched, own)
     return replace(
         rows,
-        colour=picture.color + through[..., None] * rows.colour,
+        colour=mixed(rows.colour, picture.color, picture.alpha, thing.look.mode),
         from_photo=picture.from_photo + through * rows.from_photo,
         from_lifter=picture.alpha - picture.from_photo + through * rows.from_lifter,
         from_inpainter=through * rows.from_inpainter,

@@ -8,14 +8,14 @@ lies above it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.pixels import crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
 from ..document.model import Document, EditObject, Matte, Plate
-from ..document.settings import Refined
+from ..document.settings import NORMAL, Refined
 from .blend import Box
 from .composite import Composite, Moved, composite, drawn_alone, whole_box
 from .order import holes
@@ -37,6 +37,7 @@ class Layer:
     left: int = 0  # px, corner in the photo
     top: int = 0
     is_shown: bool = True
+    mode: str = NORMAL  # of MODES: how it is mixed with those before it
 
     @property
     def box(self) -> Box:
@@ -68,7 +69,8 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
         pile += _clipped(item.name, *_resting(item.matte, photo.dtype), size)
     for k, thing in enumerate(shown):
         progress(0.5 + 0.4 * k / len(shown), "drawing")
-        pile += _clipped(thing.item.name, *_drawn(thing, document), size)
+        drawn = _clipped(thing.item.name, *_drawn(thing, document), size)
+        pile += [replace(layer, mode=thing.look.mode) for layer in drawn]
     untouched = _untouched(document, result, pile)
     above = [] if document.refined is None or not result.stack else _refined(document.refined)
     return result, [Layer(PHOTO, photo), *pile, *untouched, *above]

@@ -452,7 +452,7 @@ def _with_share(document: Document, k: int, name: str, share: float) -> Document
 
 
 def set_finish(document: Document, k: int, finish: Finish) -> Document:
-    """Set the opacity and the colours of object `k`. Raises EditError for nonsense."""
+    """Set how object `k` looks otherwise than in the photo. Raises EditError for nonsense."""
     return _with_settings(document, k, "finish", finish)
 
 

@@ -388,6 +388,7 @@ class EditObject:
     contaminated: F32 | None = None
     keys: tuple[KeyPose, ...] = ()  # key poses of an animation, as many as the document has
     finish: Finish = AS_IN_THE_PHOTO
+    is_locked: bool = False  # against changes by a slip
 
     @property
     def found_matte(self) -> Matte | None:

@@ -75,16 +75,22 @@ MOST_EXPOSURE = 3.0  # stops, up or down
 MOST_SATURATION = 2.0
 GAMMA = 2.2  # of encoded values: a stop of linear light is a factor of them
 WARMTH = 0.5  # stops, by which red rises and blue falls at a warmth of 1
+MOST_SHARPNESS = 3.0
+MOST_BLUR = 50.0  # px
+NORMAL, MULTIPLY, SCREEN, SOFT_LIGHT = MODES = ("normal", "multiply", "screen", "soft light")
 
 
 @dataclass(frozen=True)
 class Finish:
-    """The opacity and the colours of an object, as the artist wants them."""
+    """The opacity, colours and sharpness of an object, as the artist wants them."""
 
     opacity: float = 1.0  # in [0, 1]
     exposure: float = 0.0  # stops of light
     warmth: float = 0.0  # in [-1, 1], from blue to amber
     saturation: float = 1.0  # x as far from grey, in [0, 2]
+    sharpness: float = 0.0  # x the fine detail that is added to it
+    blur: float = 0.0  # px of the photo, standard deviation
+    blend_mode: str = NORMAL  # of MODES: how it is mixed with what lies behind it
 
     def check(self) -> None:
         """Raises ValueError where a number makes no sense."""
@@ -101,6 +107,14 @@ class Finish:
             raise ValueError(
                 f"a saturation of {self.saturation:g} is not between 0 and {MOST_SATURATION:g}"
             )
+        if not 0 <= self.sharpness <= MOST_SHARPNESS:
+            raise ValueError(
+                f"a sharpness of {self.sharpness:g} is not between 0 and {MOST_SHARPNESS:g}"
+            )
+        if not 0 <= self.blur <= MOST_BLUR:
+            raise ValueError(f"a blur of {self.blur:g} px is not between 0 and {MOST_BLUR:g}")
+        if self.blend_mode not in MODES:
+            raise ValueError(f"a blend mode is {self.blend_mode!r}, not one of {', '.join(MODES)}")
 
     @property
     def gain(self) -> tuple[float, float, float]:

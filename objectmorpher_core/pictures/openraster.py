@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..compose.layers import Layer
+from ..document.settings import MULTIPLY, NORMAL, SCREEN, SOFT_LIGHT
 from .image import Picture, at_most, encode_picture, to_u8
 
 ENDING = ".ora"
@@ -21,7 +22,11 @@ MIME = "image/openraster"
 VERSION = "0.0.6"
 THUMBNAIL = 256  # px, its longer side
 TRANSPARENCY = "Photo, transparency"
-OVER, INSIDE = "svg:src-over", "svg:dst-in"  # how a layer lies on those below
+INSIDE = "svg:dst-in"  # how a layer lies on those below
+MIXED = {
+    NORMAL: "svg:src-over", MULTIPLY: "svg:multiply", SCREEN: "svg:screen",
+    SOFT_LIGHT: "svg:soft-light",
+}  # fmt: skip
 BORN = (1980, 1, 1, 0, 0, 0)  # of all that is in the file: two exports are alike, byte for byte
 
 
@@ -31,7 +36,7 @@ def encode_openraster(layers: Sequence[Layer], merged: Picture) -> bytes:
     Where `merged` is not opaque, a last layer cuts out what is under it (`svg:dst-in`).
     """
     height, width = merged.pixels.shape[:2]
-    pile = [(layer, OVER) for layer in layers]
+    pile = [(layer, MIXED[layer.mode]) for layer in layers]
     if merged.alpha is not None:
         solid = np.dstack([np.zeros_like(merged.pixels), merged.alpha])
         pile.append((Layer(TRANSPARENCY, solid), INSIDE))

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..base.threads import core_count
 from ..compose.layers import Layer
+from ..document.settings import MULTIPLY, NORMAL, SCREEN, SOFT_LIGHT
 from .image import ImageError, Picture
 
 MOST_SIDE = 30_000  # px, of the format
@@ -30,6 +31,7 @@ HIDDEN, PHOTOSHOP_5, IS_EMPTY = 2, 8, 16  # flags of a layer; the last one: it i
 OPEN_GROUP, END_OF_GROUP = 1, 3  # of a divider between layers
 GROUP = "Photo, transparency"
 PROGRAM = "ObjectMorpher"
+MIXED = {NORMAL: b"norm", MULTIPLY: b"mul ", SCREEN: b"scrn", SOFT_LIGHT: b"sLit"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,7 @@ class _Record:
     flags: int
     divider: int = 0
     mask: np.ndarray | None = None  # (H, W) over the whole picture
+    mode: str = NORMAL
 
 
 def encode_psd(layers: Sequence[Layer], merged: Picture) -> bytes:
@@ -78,7 +81,8 @@ def _record(layer: Layer) -> _Record:
     if count == 4:
         channels = {ALPHA: layer.pixels[..., 3], **channels}
     box = (layer.left, layer.top, layer.left + width, layer.top + height)
-    return _Record(layer.name, box, channels, 0 if layer.is_shown else HIDDEN)
+    flags = 0 if layer.is_shown else HIDDEN
+    return _Record(layer.name, box, channels, flags, mode=layer.mode)
 
 
 def _nothing() -> dict[int, np.ndarray | None]:
@@ -124,7 +128,9 @@ def _head(record: _Record, data: dict[int, bytes]) -> bytes:
     left, top, right, bottom = record.box
     parts = [struct.pack(">4iH", top, left, bottom, right, len(data))]
     parts += [struct.pack(">hI", number, len(channel)) for number, channel in data.items()]
-    parts.append(MARK + b"norm" + struct.pack(">BBBx", 255, 0, record.flags | PHOTOSHOP_5))
+    parts.append(
+        MARK + MIXED[record.mode] + struct.pack(">BBBx", 255, 0, record.flags | PHOTOSHOP_5)
+    )
     mask = b""
     if record.mask is not None:
         mask = struct.pack(">4iBBxx", 0, 0, *record.mask.shape, 0, 0)

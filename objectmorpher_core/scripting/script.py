@@ -15,7 +15,15 @@ from typing import Any
 from ..base.files import read_input
 from ..base.quoting import count_range, meant, shown
 from ..document.model import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
-from ..document.settings import MOST_EXPOSURE, MOST_SATURATION
+from ..document.settings import (
+    MODES,
+    MOST_BLUR,
+    MOST_EXPOSURE,
+    MOST_SATURATION,
+    MOST_SHARPNESS,
+    NORMAL,
+    Finish,
+)
 
 XY = tuple[float, float]
 MOST_NUMBER = 1e9  # px, degrees, diameters
@@ -73,6 +81,9 @@ class EditScript:
     exposure: float = 0.0  # stops
     warmth: float = 0.0  # in [-1, 1], from blue to amber
     saturation: float = 1.0  # x as far from grey
+    sharpness: float = 0.0  # x its fine detail
+    blur: float = 0.0  # px
+    blend_mode: str = NORMAL  # of MODES
     decontaminate: float = 0.0  # in [0, 1], of the background's colour in its edge
     front: tuple[XY, ...] = ()  # px, on things that stay in front of what is edited
     front_mask: str | None = None  # file: another one
@@ -394,7 +405,8 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "shape": _one_of(*KINDS), "trust": _between(0, 1), "decontaminate": _between(0, 1),
     "opacity": _between(0, 1), "warmth": _between(-1, 1),
     "exposure": _between(-MOST_EXPOSURE, MOST_EXPOSURE),
-    "saturation": _between(0, MOST_SATURATION),
+    "saturation": _between(0, MOST_SATURATION), "sharpness": _between(0, MOST_SHARPNESS),
+    "blur": _between(0, MOST_BLUR), "blend_mode": _one_of(*MODES),
     "no_depth": _flag, "hidden": _text,
     "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
     "pin": _points, "handle": _handles, "key": _keys,
@@ -411,5 +423,5 @@ OF_THE_PHOTO = {"fov", "inpaint", "refine_strength", "front", "front_mask", "see
 CHOOSING = {"click", "not_click", "box", "subject", "mask", "segment"}
 OF_A_KEY = {"pin", "handle", "move", "turn", "scale"}
 MOST_KEYS = 11  # beside the pose of the edit itself
-OF_A_FINISH = frozenset({"opacity", "exposure", "warmth", "saturation"})
+OF_A_FINISH = frozenset(field.name for field in fields(Finish))
 OF_A_COPY = {"pin", "handle", "move", "turn", "scale", "shadow", "refine"} | OF_A_FINISH

@@ -20,7 +20,7 @@ from objectmorpher_core.pictures.psd import encode_psd
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 
 
-def scene(dtype: type) -> tuple[list[Layer], Picture]:
+def scene(dtype: type, mode: str = "normal") -> tuple[list[Layer], Picture]:
     """A cat, a soft piece of a cup over it, and a hidden layer; and what they look like."""
     top = np.iinfo(dtype).max // 255
     cat = data.chelsea()[:201, :303].astype(dtype) * dtype(top)
@@ -33,19 +33,23 @@ def scene(dtype: type) -> tuple[list[Layer], Picture]:
     part[:] = np.rint(cup * soft[..., None] + part * (1 - soft[..., None])).astype(dtype)
     pile = [
         Layer("Photo", cat), Layer("Hidden", cup, 3, 5, is_shown=False),
-        Layer("Tasse, größer ☕", np.dstack([cup, alpha]), 70, 40),
+        Layer("Tasse, größer ☕", np.dstack([cup, alpha]), 70, 40, mode=mode),
     ]  # fmt: skip
     return pile, Picture(merged, icc=PROFILE)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_layers_come_back(dtype: type) -> None:
-    pile, merged = scene(dtype)
+@pytest.mark.parametrize(
+    ("dtype", "mode"),
+    [(np.uint8, "normal"), (np.uint16, "soft light"), (np.uint8, "multiply"), (np.uint8, "screen")],
+)
+def test_layers_come_back(dtype: type, mode: str) -> None:
+    pile, merged = scene(dtype, mode)
     file = encode_psd(pile, merged)
     psd = PSDImage.open(io.BytesIO(file))
     assert psd.depth == 8 * np.dtype(dtype).itemsize
     assert [layer.name for layer in psd] == [layer.name for layer in pile]
     assert [layer.visible for layer in psd] == [True, False, True]
+    assert psd[2].blend_mode.name == mode.upper().replace(" ", "_")
     most = np.iinfo(dtype).max
     for stored, layer in zip(psd, pile, strict=True):
         assert (stored.left, stored.top) == (layer.left, layer.top)

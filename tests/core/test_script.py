@@ -27,7 +27,8 @@ FULL = {
     "flip": True, "thickness": 0.5, "back": "mirrored", "symmetry": "no", "floating": True,
     "shape": "box", "trust": 0.5, "no-depth": True, "hidden": "h.png", "front": [[9, 9]],
     "front-mask": "f.png", "remove": True, "refine-strength": 0.5, "decontaminate": 0.5,
-    "opacity": 0.5, "exposure": -1.0, "warmth": 0.25, "saturation": 0.5,
+    "opacity": 0.5, "exposure": -1.0, "warmth": 0.25, "saturation": 0.5, "sharpness": 1.5,
+    "blur": 2.0, "blend-mode": "soft light",
     "fill-from": [{"source": [1, 2], "to": [3, 4], "radius": 5}, {"source": [1, 2], "to": [3, 4]}],
 }  # fmt: skip
 

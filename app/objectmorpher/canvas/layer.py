@@ -10,6 +10,7 @@ import numpy as np
 from objectmorpher_core.base.arrays import U8
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document, EditObject
+from objectmorpher_core.document.settings import NORMAL
 
 from ..editor.view import Shown
 from .shape import CanvasShape
@@ -35,6 +36,7 @@ class CanvasLayer:
     is_tint: bool = False  # lies over everything, translucent
     is_weighed: bool = False  # by the edit's share already: the blend does not count
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
+    mode: str = NORMAL  # of MODES
 
     @property
     def pixels(self) -> U8:
@@ -116,11 +118,14 @@ NEUTRAL = (1.0, 1.0, 1.0)
 
 def in_light(shown: CanvasLayer, look: Lit, place: tuple[float, ...]) -> CanvasLayer:
     """Light an object in the order of the export; `place` is the `View.place` of the picture."""
+    from objectmorpher_core.compose.light.defocus import sharpened_rgba
     from objectmorpher_core.compose.light.harmonize import lit_rgba, saturated
 
     left, top, zoom = place[:3]
     if look.blur > 0 and shown.invented is None:  # where what is the photo's is marked, it is exact
         shown = _out_of_focus(shown, look.blur * zoom, (int(place[3]), int(place[4])))
+    if look.sharpness > 0 and shown.invented is None:
+        shown = replace(shown, rgba=sharpened_rgba(shown.pixels, look.sharpness, zoom))
     x0, y0 = shown.box[:2]
     corner = (left + x0 / zoom, top + y0 / zoom, zoom)
     rgba, gain = shown.pixels, look.gain
@@ -132,7 +137,7 @@ def in_light(shown: CanvasLayer, look: Lit, place: tuple[float, ...]) -> CanvasL
         whole = lit_rgba(rgba, gain).astype(np.float32)
         whole[..., :3] = saturated(whole[..., :3], whole[..., 3], look.saturation)
         rgba, gain = (whole * np.float32(look.opacity) + 0.5).astype(np.uint8), NEUTRAL
-    return replace(shown, rgba=rgba, gain=gain)
+    return replace(shown, rgba=rgba, gain=gain, mode=look.mode)
 
 
 def _out_of_focus(shown: CanvasLayer, blur: float, size: tuple[int, int]) -> CanvasLayer:

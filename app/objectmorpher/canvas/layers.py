@@ -255,8 +255,9 @@ def _lit(work: _Work, look: Lit) -> CanvasLayer:
     if work.request.part.is_painted:
         return shown
     is_plain = look.relit is None and look.grain is None and look.saturation == 1
-    if is_plain and look.blur <= 0 and look.opacity == 1:
-        return shown if look.gain == shown.gain else replace(shown, gain=look.gain)
+    if is_plain and look.blur <= 0 and look.sharpness <= 0 and look.opacity == 1:
+        is_same = look.gain == shown.gain and look.mode == shown.mode
+        return shown if is_same else replace(shown, gain=look.gain, mode=look.mode)
     kept = work.lit
     if kept is None or kept[0] is not shown or kept[1] is not look:
         kept = work.lit = shown, look, in_light(shown, look, work.view)

@@ -210,6 +210,10 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--exposure", type=float, metavar="STOPS", help="brighten or darken it, -3 to 3 stops")
     add("--warmth", type=float, metavar="W", help="its colour, -1 (blue) to 1 (amber)")
     add("--saturation", type=float, metavar="S", help="its colours, 0 (grey) to 2; default 1")
+    add("--sharpness", type=float, metavar="S", help="sharpen its fine detail, 0 to 3 times")
+    add("--blur", type=float, metavar="PX", help="blur it by so many pixels, 0 to 50")
+    add("--blend-mode", type=lambda name: name.replace("-", " "), metavar="MODE",
+        help="mix it with what is behind it: normal, multiply, screen or soft-light")  # fmt: skip
     add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
     add("--flip", action="store_true", default=None, help="turn that file upside down")
     add = parser.add_argument_group("deforming").add_argument

@@ -14,7 +14,8 @@ from .command import Command
 # English keys of texts, as the panels have them; a test checks that each is one.
 
 SETTINGS: dict[str, tuple[str, ...]] = {
-    "preferences": ("Theme", "Text size", "Language", "Motion", "File dialogs", "Long jobs"),
+    "preferences": ("Theme", "Text size", "Language", "Motion", "Screen colours", "File dialogs",
+                    "Long jobs"),
     "select": ("Select by", "Keep in front"),
     "mask": ("Brush", "Radius", "Hardness", "Distance", "Edge", "Decontaminate", "Depth", "Hidden"),
     "pose": (

@@ -41,6 +41,10 @@ def _stays(editor: Editor) -> bool:
     return editor.object is not None and editor.object.stays_in_front
 
 
+def _is_locked(editor: Editor) -> bool:
+    return editor.object is not None and editor.object.is_locked
+
+
 def _rename(editor: Editor) -> None:
     editor.objects.renaming = editor.current
 
@@ -51,6 +55,9 @@ COMMANDS: dict[str, Command] = {
     "duplicate": Command("Duplicate object", "Ctrl+J", lambda e: e.objects.duplicate(), no_lift),
     "remove_object": Command(
         "Remove object", "Shift+Delete", lambda e: e.objects.remove(), _no_object
+    ),
+    "lock": Command(
+        "Lock object", "Ctrl+Alt+L", lambda e: e.lock(e.current), _no_object, _is_locked
     ),
     "keep_in_front": Command(
         "Keep in front", "", lambda e: e.objects.toggle_front(), _cannot_keep, _stays

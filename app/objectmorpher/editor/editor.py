@@ -95,6 +95,7 @@ class Editor(EditorState):
             Dialog.SHAPE_OPEN: self.shaping.open_file,
             Dialog.MODEL_OPEN: self.models.add,
             Dialog.MODEL_FOLDER: self.models.hub.use_folder,
+            Dialog.PROFILE_OPEN: self.looking.use_profile,
         }
 
     def _in_order(self) -> tuple[Callable[[], bool], ...]:

@@ -41,6 +41,7 @@ class Dialog(Enum):
     SHAPE_OPEN = "Use 3D file"
     MODEL_OPEN = "Use depth model"
     MODEL_FOLDER = "Use the model in a folder"
+    PROFILE_OPEN = "Use colour profile"
 
     @property
     def is_opening(self) -> bool:

@@ -132,6 +132,7 @@ class Refits:
                 self._answer = answer  # once more, when the hand is idle
                 return
             assert editor.history is not None and editor.committed is not None
+            changed = _held(editor, changed, k)
             lost = len(editor.committed.objects[k].handles) - len(changed.objects[k].handles)
             editor.history.amend(changed)
             self._posing.forget_lost()
@@ -140,6 +141,15 @@ class Refits:
 
         title = t("Fitting {name} to its new outline", name=_name(editor, k))
         self._tasks.make_ready(k, change, title, show)
+
+
+def _held(editor: EditorState, changed: Document, k: int) -> Document:
+    """Object `k` and its copies hold their pose in the new shape: the next drag begins there."""
+    lifted = changed.objects[k].lifted
+    for j, own in enumerate(changed.objects):
+        if own.lifted is lifted and own.pose is not None and own.handles:
+            changed = editor.derived.held(changed, j)
+    return changed
 
 
 def _disturbed(editor: EditorState, before: Document, after: Document, k: int) -> Mask:

@@ -24,6 +24,7 @@ RECENT = 6  # files remembered
 LARGEST = 1e9  # of any number that is no whole one
 AUTO = "auto"
 HERE, SERVER = "here", "server"  # where jobs run
+AS_THEY_ARE = "off"
 TABLES = ("backends", "shortcuts")  # of the file; everything else is a line of it
 DOCTORS = {  # stage, as in the settings -> what the doctor calls it
     "segment": "select", "lift": "lift", "inpaint": "background", "refine": "refine",
@@ -55,6 +56,7 @@ class Settings:
     scale: float = 0.0  # canvas px per point; 0: the monitor's
     dialogs: str = AUTO  # file dialogs: "auto" (the system's where there are any) or "built-in"
     motion: str = AUTO  # "auto" (as the system has it), "full" or "reduced"
+    screen_profile: str = AUTO  # "auto" (the system's), "off", or the path of an ICC file
     quality: int = 95  # of JPEG exports
     webp_quality: int = 100  # of WebP exports; 100 is lossless
     export_what: str = "Photo"  # the last export's, see `export_plan.py`

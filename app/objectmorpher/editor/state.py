@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.document import lock_edits
 from objectmorpher_core.document.model import Document, EditObject
 
 from ..canvas.derived import Derived
@@ -40,7 +41,7 @@ class EditorState:
         self.chores = Chores(wake)
         self.cache = Cache()
         self.history: History | None = None
-        self.preview: Document | None = None  # of the stroke in progress
+        self._preview: Document | None = None
         self.path: Path | None = None  # the session's file
         self.source: Path | None = None  # the photo's file
         self.current = 0  # index of the object that the tools change
@@ -57,6 +58,15 @@ class EditorState:
         if self.preview is not None:
             return self.preview
         return self.committed
+
+    @property
+    def preview(self) -> Document | None:
+        """The document of the stroke in progress; none that changes a locked object."""
+        return self._preview
+
+    @preview.setter
+    def preview(self, preview: Document | None) -> None:
+        self._preview = None if preview is not None and self._is_refused(preview) else preview
 
     @property
     def derived(self) -> Derived:
@@ -123,7 +133,34 @@ class EditorState:
         """`document` is the next step."""
         assert self.history is not None
         self.preview = None
-        self.history.apply(label, document)
+        if not self._is_refused(document):
+            self.history.apply(label, document)
+
+    def _is_refused(self, changed: Document) -> bool:
+        """Whether it changes a locked object, which is said."""
+        before = self.committed
+        own = None if before is None else lock_edits.locked_change(before, changed)
+        if before is not None and own is not None:
+            self.say_locked(next(k for k, each in enumerate(before.objects) if each is own))
+        return own is not None
+
+    def say_locked(self, k: int) -> None:
+        """That object `k` is locked, with a button that unlocks it."""
+        if self.committed is not None:
+            name = self.committed.objects[k].name
+            self.say(t("{name} is locked", name=name), Action(t("Unlock"), lambda: self.lock(k)))
+
+    def lock(self, k: int) -> None:
+        """Locks object `k`, or unlocks it; a step."""
+        document = self.committed
+        if document is not None and k < len(document.objects) and not self.hand.is_busy:
+            is_locked = not document.objects[k].is_locked
+            label = t("Lock object") if is_locked else t("Unlock object")
+            self.apply(label, lock_edits.set_locked(document, k, is_locked))
+            if is_locked:
+                self.say_locked(k)
+            else:
+                self.say(t("It can be changed again"))
 
     def commit(self, label: str) -> None:
         """The preview becomes a step; without a label it is dropped."""

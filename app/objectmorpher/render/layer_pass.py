@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
+from objectmorpher_core.document.settings import MODES, NORMAL
+
 from ..canvas.layer import CanvasLayer
 from ..editor.view import ViewState
 from .photo_pass import hatch_uniforms
@@ -23,34 +25,53 @@ if TYPE_CHECKING:
     from .splat_pass import SplatPicture
 
 
-# Puts a rendered object out of focus on the GPU, as `compose.defocus.blurred` does.
+# Blurs and sharpens a rendered object on the GPU, as `compose.light.defocus` does.
 
-_BLUR_UNITS = {"picture": 0}
+_BLUR_UNITS = {"picture": 0, "detailed": 1}
 
 
 class DefocusPass:
-    """Two passes, across and down; its pictures are valid until the next call."""
+    """Passes across and down; its pictures are valid until the next call."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
         self._programs = Programs(context, "fullscreen.vert", "defocus.frag", _BLUR_UNITS)
         self._targets: tuple[moderngl.Framebuffer, ...] = ()
 
-    def draw(self, picture: SplatPicture, blur: float) -> SplatPicture:
-        """The picture, its colour and alpha blurred by so many of its px."""
+    def draw(self, picture: SplatPicture, item: SplatObject, zoom: float) -> SplatPicture:
+        """The picture as `item` wants it, with so many of its px for one of the photo."""
+        from objectmorpher_core.compose.light.defocus import DETAIL
+
+        if item.blur <= 0 and item.sharpness <= 0:
+            return picture
+        color = picture.color
+        first, second, third = self._sized(color.size)
+        self._context.enable_only(moderngl.NOTHING)
+        if item.blur > 0:
+            color = self._blurred(color, (first, second), item.blur * zoom)
+        if item.sharpness > 0:
+            color.use(_BLUR_UNITS["detailed"])
+            color = self._blurred(color, (first, third), DETAIL * zoom, item.sharpness)
+        return replace(picture, color=color)
+
+    def _blurred(
+        self, source: moderngl.Texture, targets: tuple[moderngl.Framebuffer, ...], blur: float,
+        sharpness: float = 0.0,
+    ) -> moderngl.Texture:  # fmt: skip
+        """Blurred by so many px; or, in the second pass, what is `detailed` made sharper."""
         from objectmorpher_core.compose.light.defocus import reach_of
 
-        program, array = self._programs()
-        source = picture.color
-        self._context.enable_only(moderngl.NOTHING)
-        for target, step in zip(self._sized(source.size), ((1, 0), (0, 1)), strict=True):
+        for target, way in zip(targets, ((1, 0), (0, 1)), strict=True):
+            is_sharper = sharpness > 0 and way[1]
+            program, array = self._programs(*(["SHARPEN"] if is_sharper else []))
             target.use()
             source.use(_BLUR_UNITS["picture"])
-            set_uniforms(program, way=step, reach=reach_of(blur), blur=blur)
+            set_uniforms(program, way=way, reach=reach_of(blur), blur=blur, sharpness=sharpness)
             array.render(moderngl.TRIANGLES, 3)
-            source = target.color_attachments[0]
-            assert isinstance(source, moderngl.Texture)
-        return replace(picture, color=source)
+            made = target.color_attachments[0]
+            assert isinstance(made, moderngl.Texture)
+            source = made
+        return source
 
     def _sized(self, size: tuple[int, int]) -> tuple[moderngl.Framebuffer, ...]:
         """What is drawn into; made anew when the canvas has changed."""
@@ -59,17 +80,17 @@ class DefocusPass:
                 for texture in target.color_attachments:
                     texture.release()
                 target.release()
-            textures = [self._context.texture(size, 4, dtype="f2") for _ in range(2)]
+            textures = [self._context.texture(size, 4, dtype="f2") for _ in range(3)]
             for texture in textures:
                 texture.filter = moderngl.NEAREST, moderngl.NEAREST
             self._targets = tuple(self._context.framebuffer([texture]) for texture in textures)
         return self._targets
 
 
-LAYER, MARKS, RELIT, AMOUNTS, NOISE, DEVIATIONS = (0, 1, 2, 4, 5, 6)  # texture units
+LAYER, MARKS, RELIT, AMOUNTS, NOISE, DEVIATIONS, UNDER = (0, 1, 2, 4, 5, 6, 3)  # texture units
 _UNITS = {
     "layer": LAYER, "marks": MARKS, "relit": RELIT, "blend": BLEND,
-    "amounts": AMOUNTS, "grain": NOISE, "deviations": DEVIATIONS,
+    "amounts": AMOUNTS, "grain": NOISE, "deviations": DEVIATIONS, "under": UNDER,
 }  # fmt: skip
 TINT = 0.6  # opacity
 
@@ -82,6 +103,7 @@ class LayerPass:
         self._programs = Programs(context, "quad.vert", "layer.frag", _UNITS)
         self._uploaded: dict[int, tuple[CanvasLayer, dict[int, moderngl.Texture]]] = {}
         self._factors: moderngl.Texture | None = None
+        self._under: moderngl.Texture | None = None
         self._grain = GrainTextures(context)
 
     def draw(self, scene: Scene, view: ViewState) -> None:
@@ -98,6 +120,7 @@ class LayerPass:
         is_over = layer.is_tint or layer.is_weighed
         marks = scene.refined if layer.is_weighed else scene.marks
         defines = _defines(scene, marks is not None and layer.invented is not None, is_over)
+        defines += self._mixing(layer, scene)
         program, quad = self._programs(*defines)
         set_uniforms(program, box=layer.box, **_appearance(layer), **hatch_uniforms(marks, view))
         self._render(program, quad, scene, view)
@@ -111,6 +134,7 @@ class LayerPass:
         if picture.detail is not None:
             picture.detail.use(MARKS)
         defines = ["DETAIL", *_defines(scene, is_marked, item.is_tint)]
+        defines += self._mixing(item, scene)
         values = _appearance(item) | hatch_uniforms(scene.marks, view)
         if item.relit is not None:
             defines.append("HAS_RELIT")
@@ -121,6 +145,19 @@ class LayerPass:
         program, quad = self._programs(*defines)
         set_uniforms(program, box=(0, 0, view.width, view.height), **values)
         self._render(program, quad, scene, view)
+
+    def _mixing(self, thing: CanvasLayer | SplatObject, scene: Scene) -> list[str]:
+        """What the shader needs to know of what is there already: most things only cover it."""
+        if thing.mode == NORMAL or thing.is_tint or scene.paper is not None:
+            return []
+        target = self._context.fbo
+        if self._under is None or self._under.size != target.size:
+            if self._under is not None:
+                self._under.release()
+            self._under = self._context.texture(target.size, 4)
+        self._context.copy_framebuffer(self._under, target)
+        self._under.use(UNDER)
+        return [f"MODE {MODES.index(thing.mode)}"]
 
     def _use_factors(self, relit: Relit, view: ViewState) -> tuple[float, float, float, float]:
         """Uploads them, with nothing around them; where on the canvas they lie."""

@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 
 from objectmorpher_core.base.arrays import U8
+from objectmorpher_core.document.settings import NORMAL
 
 from ..canvas.layer import CanvasLayer
 from ..canvas.memo import same
@@ -18,11 +19,14 @@ from ..editor.view import ViewState
 from .layer_pass import DefocusPass, LayerPass, photo_box
 from .photo_pass import PhotoPass
 from .scene import Colour, Scene, SplatObject
+from .shaders import Programs
 from .textures import BlendTexture, PictureTexture
 
 if TYPE_CHECKING:
     from .splat_pass import SplatPass, SplatPicture
 
+
+Viewport = tuple[int, int, int, int]  # left, bottom, width, height of the canvas, framebuffer px
 
 # The pictures under the objects of a still view: the photo, and the edit's background.
 
@@ -71,7 +75,9 @@ def _is_plain(scene: Scene) -> bool:
     if scene.objects or scene.paper is not None or scene.split > 0 or scene.veil > 0:
         return False
     layers = scene.shades + scene.layers
-    return not any(layer.is_tint or layer.invented is not None for layer in layers)
+    return not any(
+        layer.is_tint or layer.invented is not None or layer.mode != NORMAL for layer in layers
+    )
 
 
 # The window's last picture below the interface: copied as long as nothing of it changes.
@@ -127,9 +133,43 @@ def same_scene(a: Any, b: Any) -> bool:
     return same(a, b)
 
 
-log = logging.getLogger(__name__)
+class ScreenPass:
+    """Draws the canvas in the colours that the screen has to be told."""
 
-Viewport = tuple[int, int, int, int]  # left, bottom, width, height of the canvas, framebuffer px
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        units = {"canvas": 0, "table": 1}
+        self._programs = Programs(context, "fullscreen.vert", "screen.frag", units)
+        self._kept: tuple[U8, moderngl.Texture3D] | None = None
+
+    def draw(self, canvas: moderngl.Framebuffer, table: U8, part: Viewport) -> None:
+        """The `part` of the target that shows the photo; the rest stays as it is."""
+        if self._kept is None or self._kept[0] is not table:
+            if self._kept is not None:
+                self._kept[1].release()
+            texture = self._context.texture3d(
+                table.shape[:3][::-1], 3, table.tobytes(), alignment=1
+            )
+            texture.filter = moderngl.LINEAR, moderngl.LINEAR
+            texture.repeat_x = texture.repeat_y = texture.repeat_z = False
+            self._kept = table, texture
+        source = canvas.color_attachments[0]
+        assert isinstance(source, moderngl.Texture)
+        source.use(0)
+        self._kept[1].use(1)
+        self._context.viewport = part
+        self._programs()[1].render(moderngl.TRIANGLES, 3)
+
+
+def _part(viewport: Viewport, box: tuple[float, float, float, float]) -> Viewport:
+    """Of a viewport what `box` covers, px of the canvas from its left top."""
+    left, bottom, width, height = viewport
+    x0, x1 = (min(max(round(v), 0), width) for v in box[::2])
+    y0, y1 = (min(max(round(v), 0), height) for v in box[1::2])
+    return left + x0, bottom + height - y1, x1 - x0, y1 - y0
+
+
+log = logging.getLogger(__name__)
 
 SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")
 
@@ -149,6 +189,8 @@ class Renderer:
         self._layer_pass = LayerPass(context)
         self._defocus_pass = DefocusPass(context)
         self._splat_pass: SplatPass | None = None
+        self._screen_pass = ScreenPass(context)
+        self.table: U8 | None = None  # the photo's colours on this screen, see `screen_table`
         self._kept, self._still = KeptCanvas(context), StillView()
         self._target = context.screen
         self._surround: Colour = (0.0, 0.0, 0.0)
@@ -185,6 +227,9 @@ class Renderer:
                 self._target = self._context.screen
         assert kept.buffer is not None
         self._context.copy_framebuffer(self._target, kept.buffer)
+        if self.table is not None:
+            self._use(viewport)
+            self._screen_pass.draw(kept.buffer, self.table, _part(viewport, photo_box(scene, view)))
         self._use(viewport)
 
     def _flat(self, scene: Scene, view: ViewState, viewport: Viewport, place: Place) -> U8 | None:
@@ -215,8 +260,8 @@ class Renderer:
                 continue
             picture = self._render(item, view)
             if picture is not None:
-                if item.blur > 0 and not item.is_marked:
-                    picture = self._defocus_pass.draw(picture, item.blur * view.zoom)
+                if not item.is_marked:
+                    picture = self._defocus_pass.draw(picture, item, view.zoom)
                 self._use(viewport)
                 self._blend.use(scene)
                 self._layer_pass.draw_picture(picture, item, scene, view)
@@ -248,8 +293,10 @@ class Renderer:
         return np.frombuffer(data, np.uint8).reshape(size[1], size[0], 3)[::-1]
 
     def read_pixel(self, left: int, bottom: int) -> tuple[int, int, int]:
-        """Read one of the window's pixels, u8."""
-        data = self._context.screen.read(viewport=(left, bottom, 1, 1), components=3, alignment=1)
+        """Read one of the canvas's pixels, u8, as it is before the screen's colours."""
+        if self._kept.buffer is None:
+            return 0, 0, 0
+        data = self._kept.buffer.read(viewport=(left, bottom, 1, 1), components=3, alignment=1)
         return data[0], data[1], data[2]
 
     def _use(self, viewport: Viewport) -> None:

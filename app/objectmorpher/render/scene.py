@@ -10,6 +10,7 @@ from objectmorpher_core.base.arrays import F32, Pixels, Selection
 from objectmorpher_core.base.brush import Box
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Plate
+from objectmorpher_core.document.settings import NORMAL
 
 from ..canvas.layer import CanvasLayer
 
@@ -47,6 +48,8 @@ class SplatObject:
     blur: float = 0.0  # px of the photo, standard deviation, before all that
     saturation: float = 1.0  # after all that
     opacity: float = 1.0
+    sharpness: float = 0.0  # after the blur
+    mode: str = NORMAL  # of MODES
 
 
 @dataclass(frozen=True, eq=False)

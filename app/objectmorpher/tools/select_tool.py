@@ -45,7 +45,9 @@ class SelectTool:
     def _click(self, editor: Editor, pointer: Pointer, is_foreground: bool) -> None:
         other = editor.landing.moved_at(pointer.xy)
         if other is not None and other != editor.current:
-            editor.objects.take_up(other)
+            assert editor.document is not None
+            is_locked = editor.document.objects[other].is_locked
+            (editor.say_locked if is_locked else editor.objects.take_up)(other)
             return
         x, y = editor.landing.in_photo(pointer.xy)
         editor.selection.add_click(float(x), float(y), is_foreground)

@@ -5,6 +5,7 @@ So they are the same for window and export.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...base.arrays import F32, F64
 from ...base.camera import Camera
 from ...document.model import Document, EditObject, LiftedObject, Matte
-from ...document.settings import AS_IN_THE_PHOTO, Shadow
+from ...document.settings import AS_IN_THE_PHOTO, NORMAL, Shadow
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, build_levels
 from ..plate.plate import plate_cover
@@ -41,8 +42,10 @@ class Lit:
     relit: Relit | None = None
     grain: Grain | None = None
     blur: float = 0.0  # px of the photo, standard deviation; before all the others
+    sharpness: float = 0.0  # x its fine detail; after the blur
     saturation: float = 1.0  # x as far from grey; after all the others
     opacity: float = 1.0  # of the whole
+    mode: str = NORMAL  # of MODES
 
 
 NOTHING = Lit()
@@ -142,8 +145,11 @@ class Lighting:
                 carried = texture or object_texture(item.matte, item.lifted)
                 grain = find_grain(splats, carried, self.noise, item.grain, camera, blur)
         r, g, b = (a * own for a, own in zip(gain, item.finish.gain, strict=True))
-        own = item.finish.saturation, item.finish.opacity
-        return Lit((r, g, b), shade, relit, grain, blur, *own)
+        own = item.finish
+        return Lit(
+            (r, g, b), shade, relit, grain, math.hypot(blur, own.blur), own.sharpness,
+            own.saturation, own.opacity, own.blend_mode,
+        )  # fmt: skip
 
     def _defocus(
         self, item: EditObject, splats: PosedSplats, rest: PosedSplats, horizon: float | None

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image, ImageCms
 
 from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.editor.view import ViewState
@@ -14,11 +16,13 @@ from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Placement
-from objectmorpher_core.document.settings import Finish, Shadow
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.settings import MODES, Finish, Shadow
+from objectmorpher_core.pictures.screen_colours import screen_table
 from objectmorpher_core.pipeline import make_plate
 from tests import focussed, shapes
 from tests.app.render.pictures import make_renderer, specified
+from tests.tree import over
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
 
@@ -152,6 +156,39 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     assert np.abs(window - exported).mean() <= PIXEL
 
 
+@over("finish", [Finish(0.8, 0.2, blend_mode=mode) for mode in MODES] + [
+    Finish(sharpness=1.5), Finish(blur=1.5), Finish(0.9, blur=0.7, sharpness=2.0),
+])  # fmt: skip
+@over("kind", ["tiles", "gl"])
+def test_the_window_shows_an_objects_finish_as_it_is_exported(renderer, kind, finish):
+    document = shapes.scene("ellipse", 800).document()
+    copy = replace(document.objects[0], name="Copy", placement=Placement(move=(24.0, 7.0)))
+    document = replace(document, objects=(*document.objects, copy))
+    document = edits.set_finish(document, 1, finish)
+    plain = composite(edits.set_finish(document, 1, Finish())).pixels.astype(np.float32) / 255
+    window, exported = _as_shown(renderer, document, kind), composite(document).pixels / 255
+    inside = np.abs(exported - plain).max(2) > PIXEL
+    assert finish.blend_mode == "normal" or inside.mean() > 0.1
+    assert np.abs(window - exported).mean() <= PIXEL
+    assert np.abs(window - exported)[inside].mean() <= PIXEL
+
+
+def _as_shown(renderer, document: Document, kind: str) -> np.ndarray:
+    """The photo px for px in the window."""
+    cache, view = Cache(), _view()
+    cache.frame_time = np.inf
+    view.set_zoom(1.0, (80, 60), SIZE)
+    view.left = view.top = 0.0
+    frame = build_frame(document, view, cache, renderer=kind)
+    layers = frame.layers if kind == "tiles" else ()
+    objects = splat_objects(document, frame) if kind == "gl" else ()
+    shown = Scene(
+        document.photo.pixels, (0.0, 0.0, 0.0), frame.plate,
+        frame.shades, layers, objects, blend=frame.blend,
+    )  # fmt: skip
+    return _window_picture(renderer, shown, view)
+
+
 @pytest.mark.parametrize("zoom", [1.0, 0.5])
 @pytest.mark.parametrize("kind", ["tiles", "gl"])
 def test_the_window_shows_grain_as_it_is_exported(renderer, kind, zoom):
@@ -222,3 +259,43 @@ def test_the_window_shows_focus_as_it_is_exported(renderer, kind, zoom):
     assert there.sum() > 200
     own, other = (np.abs(window - small(p))[there].mean() for p in (soft, plain))
     assert own < 0.15 * other
+
+
+def test_a_screen_is_told_the_photos_colours_and_nothing_else_changes(renderer):
+    """A wide-gamut photo on a screen of sRGB, as Little CMS itself turns each pixel of it."""
+    view, pixels = _view(), shapes.picture(shapes.mask("ellipse"))
+    view.set_zoom(1.0, (80, 60), SIZE)
+    view.left, view.top = -20.0, 0.0  # the photo begins 20 px from the canvas's left
+    scene = Scene(pixels, (0.2, 0.3, 0.1))
+    plain = _window_picture(renderer, scene, view)
+    renderer.table = screen_table(wide_profile(), None)
+    shown = _window_picture(renderer, scene, view)
+    source = ImageCms.ImageCmsProfile(io.BytesIO(wide_profile()))
+    wanted = ImageCms.profileToProfile(
+        Image.fromarray(pixels), source, ImageCms.createProfile("sRGB"),
+        ImageCms.Intent.RELATIVE_COLORIMETRIC, flags=ImageCms.Flags.BLACKPOINTCOMPENSATION,
+    )  # fmt: skip
+    assert np.abs(np.asarray(wanted).astype(int) - pixels).max() > 20
+    gap = np.abs(shown[:, 20:] * 255 - np.asarray(wanted)[:, :-20])
+    assert np.quantile(gap, 0.995) <= 2 and gap.max() < 10  # where colours are cut off
+    assert np.array_equal(shown[:, :20], plain[:, :20])
+    assert renderer.read_pixel(60, SIZE[1] - 1 - 40) == tuple(pixels[40, 40])  # as in the file
+    assert screen_table(None, None) is None
+    assert screen_table(wide_profile(), wide_profile()) is None
+    assert screen_table(b"nonsense", None) is None
+
+
+def wide_profile() -> bytes:
+    """A made ICC profile whose primaries reach far beyond sRGB's."""
+    srgb = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
+    count = int.from_bytes(srgb[128:132], "big")
+    places = {bytes(srgb[132 + 12 * k : 136 + 12 * k]): 136 + 12 * k for k in range(count)}
+    primaries = {b"rXYZ": (0.61, 0.311, 0.019), b"gXYZ": (0.205, 0.626, 0.061)}
+    white = (0.9642, 1.0, 0.8249)
+    blue = tuple(w - r - g for w, r, g in zip(white, *primaries.values(), strict=True))
+    for name, xyz in {**primaries, b"bXYZ": blue}.items():
+        at = int.from_bytes(srgb[places[name] : places[name] + 4], "big")
+        fixed = b"".join(round(v * 65536).to_bytes(4, "big", signed=True) for v in xyz)
+        srgb[at + 8 : at + 20] = fixed
+    srgb[84:100] = bytes(16)  # its digest
+    return bytes(srgb)

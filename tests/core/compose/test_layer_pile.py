@@ -9,11 +9,13 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import Pixels
+from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.layers import BACKGROUND, EMPTY, PHOTO, UNTOUCHED, Layer, layers
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Photo, Placement
-from objectmorpher_core.document.settings import Finish, Shadow
+from objectmorpher_core.document.settings import MODES, Finish, Shadow
 from objectmorpher_core.pictures.image import Picture
+from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 from tests.tree import over
 
@@ -38,8 +40,24 @@ def stacked(pile: Sequence[Layer]) -> np.ndarray:
             x0, y0, x1, y1 = layer.box
             alpha = layer.pixels[..., 3:] / top
             part = picture[y0:y1, x0:x1]
-            part += alpha * (layer.pixels[..., :3] - part)
+            above = top * mixed_by(layer.mode, part / top, layer.pixels[..., :3] / top)
+            part += alpha * (above - part)
     return picture * 255 / top
+
+
+def mixed_by(mode: str, below: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """B(below, own) of the W3C's Compositing and Blending, straight colours in [0, 1]."""
+    if mode == "multiply":
+        return below * own
+    if mode == "screen":
+        return 1 - (1 - below) * (1 - own)
+    if mode == "soft light":
+        bright = np.where(
+            below <= 0.25, 16 * below**3 - 12 * below**2 + 4 * below, np.sqrt(below)
+        )  # fmt: skip
+        darker = below - (1 - 2 * own) * below * (1 - below)
+        return np.where(own <= 0.5, darker, below + (2 * own - 1) * (bright - below))
+    return own
 
 
 def moved(document: Document, placement: Placement, k: int = 0) -> Document:
@@ -139,3 +157,39 @@ def test_an_object_of_another_finish_is_seen_so_where_it_is_and_in_its_layer(fin
     assert abs(int(layer.pixels[..., 3].max()) - 255 * finish.opacity) <= 1
     moved_too, _, _ = off(moved(document, MOVES["moved"]))
     assert moved_too.max() <= OFF
+
+
+@over("mode", MODES)
+def test_an_object_is_mixed_with_what_is_behind_it(mode):
+    """The export is the pile as any paint program mixes it, also over another object."""
+    document = shapes.scene("ellipse").document()
+    copy = replace(document.objects[0], name="Copy", placement=Placement(move=(22.0, 9.0)))
+    document = replace(document, objects=(*document.objects, copy))
+    plain, _, _ = off(document)
+    document = edits.set_finish(document, 1, Finish(0.8, blend_mode=mode))
+    difference, pixels, pile = off(document)
+    assert difference.max() <= OFF + 1 and plain.max() <= OFF
+    assert [layer.mode for layer in pile if layer.name == "Copy"] == [mode]
+    again = decode_session(encode_session(document))
+    assert again.objects[1].finish == document.objects[1].finish
+    assert np.array_equal(composite(again).pixels, pixels)
+
+
+def test_sharper_and_softer_is_finer_and_coarser_detail_and_keeps_the_edge():
+    """Sharpened, the object's detail is stronger and its silhouette the same; blurred, weaker."""
+    document = shapes.scene("ellipse").document()
+    alpha = shapes.scene("ellipse").cutout()[1]
+    inside = cv2.erode((alpha >= 1).astype(np.uint8), np.ones((15, 15))) > 0
+
+    def seen(finish):
+        difference, pixels, pile = off(edits.set_finish(document, 0, finish))
+        assert difference.max() <= OFF
+        grey = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).astype(np.float32)
+        detail = np.abs(grey - cv2.GaussianBlur(grey, (0, 0), 1.5))[inside].mean()
+        return detail, next(layer for layer in pile if layer.name == "Object 1").pixels[..., 3]
+
+    (plain, cover), (sharp, same), (soft, wider) = map(
+        seen, (Finish(exposure=1e-6), Finish(sharpness=1.5), Finish(blur=2.0))
+    )
+    assert sharp > 1.5 * plain and soft < 0.6 * plain
+    assert np.array_equal(cover, same) and wider.size > cover.size

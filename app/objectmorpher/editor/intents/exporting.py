@@ -399,6 +399,9 @@ class Exporting:
             failed=lambda error: editor.complain_of(error.retried_by(lambda: self._start(plan))),
             kind=f"{WRITE} {plan.path}",
         )  # fmt: skip
+        before = editor.jobs.shown
+        if before is not None and before.kind != f"{WRITE} {plan.path}":
+            editor.say(t("{name} is written next, after: {job}", name=name, job=before.title))
 
 
 def _what_of(path: Path) -> What:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from ..state import EditorState
 
+MOST_OFFERED = 4  # pieces
+
 
 class LeavingOut:
     """The pieces beside the document's lifted objects."""
@@ -68,12 +70,19 @@ class LeavingOut:
         return True
 
     def _offer(self) -> None:
-        """Says so where something of the current object was left out."""
-        if not self.pieces or self._editor.object is None:
+        """Says so where something of the current object was left out.
+
+        Of many pieces most are no part of it: what lies behind spokes or leaves.
+        """
+        count = len(self.pieces)
+        if not 0 < count <= MOST_OFFERED or self._editor.object is None:
             return
-        self._offered = Action(t("Add it"), self.add)
+        self._offered = Action(t("Add it") if count == 1 else t("Add them"), self.add)
         name = self._editor.object.name
-        self._editor.say(t("Is the dotted piece a part of {name}?", name=name), self._offered)
+        question = t("Is the dotted piece a part of {name}?", name=name)
+        if count > 1:
+            question = t("Are the dotted pieces parts of {name}?", name=name)
+        self._editor.say(question, self._offered)
 
     def add(self) -> None:
         """The pieces belong to the object: its outline takes them in, and its shape follows."""

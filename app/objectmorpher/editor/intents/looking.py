@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.base.arrays import U8
 from objectmorpher_core.base.rotations import turn_matrix, turn_of
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import with_centre
 
+from ...canvas.memo import Memo
 from ...system.texts import t
+from ..settings import AS_THEY_ARE, AUTO
 from ..view import Orbit, ToolName
 from .landing import OF_THE_PHOTO, Landing
 
@@ -30,6 +34,7 @@ class LookingIntents:
         self._landing = landing
         # of the last orbit: what is derived from a document is remembered by identity
         self._made: tuple[Document, int, Orbit, Document] | None = None
+        self._screens, self._tables = Memo(), Memo()
 
     @property
     def orbit(self) -> Orbit | None:
@@ -50,6 +55,43 @@ class LookingIntents:
         if made is None or made[0] is not document or made[1:3] != (k, orbit):
             made = self._made = (document, k, orbit, _alone(document, k, orbit))
         return made[3]
+
+    # The colours of the screen
+
+    def screen_profile(self) -> bytes | None:
+        """Return the ICC profile of the screen; None: it is taken for sRGB."""
+        from ...system.screen_profile import read_profile, system_profile
+
+        chosen = self._editor.settings.screen_profile
+
+        def load() -> bytes | None:
+            return system_profile() if chosen == AUTO else read_profile(Path(chosen))
+
+        return None if chosen == AS_THEY_ARE else self._screens(load, chosen)
+
+    def screen_table(self) -> U8 | None:
+        """Return the photo's colours on this screen, see `screen_colours`; None: as they are."""
+        from objectmorpher_core.pictures.screen_colours import screen_table
+
+        document = self._editor.document
+        if document is None or self._editor.settings.screen_profile == AS_THEY_ARE:
+            return None
+        photo, screen = document.photo.picture.icc, self.screen_profile()
+        return self._tables(lambda: screen_table(photo, screen), photo, screen)
+
+    def use_profile(self, path: Path) -> None:
+        """From now on the screen has the profile of a file."""
+        from objectmorpher_core.pictures.screen_colours import profile_name
+
+        from ...system.screen_profile import read_profile
+
+        editor, profile = self._editor, read_profile(path)
+        name = None if profile is None else profile_name(profile)
+        if name is None:
+            editor.complain(t("{name} is no colour profile of a screen", name=path.name))
+            return
+        editor.settings = replace(editor.settings, screen_profile=str(path.absolute()))
+        editor.say(t("The photo is shown by the profile {name}", name=name))
 
     @property
     def badge(self) -> str:

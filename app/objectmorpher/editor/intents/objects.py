@@ -125,6 +125,9 @@ class Objects:
         if editor.document is None or editor.object is None or editor.hand.is_busy:
             return
         name, k = editor.object.name, editor.current
+        if editor.object.is_locked:
+            editor.say_locked(k)
+            return
         for job in (SELECT, LIFT):  # what they would bring is for an object by its number
             editor.jobs.cancel(job)
         left = edits.remove_object(editor.document, k)
@@ -141,7 +144,8 @@ class Objects:
         for k in reversed(order):
             if document.objects[k].lifted is None:  # it stays in front, and is nobody's to drag
                 continue
-            is_there = k == editor.current or document.objects[k].is_visible
+            is_free = document.objects[k].is_visible and not document.objects[k].is_locked
+            is_there = k == editor.current or is_free
             if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
                 return None if k == editor.current or self._is_over_current(k) else k
         return None
@@ -160,6 +164,9 @@ class Objects:
         editor, k = self._editor, self._editor.current
         document, item = editor.document, editor.object
         if document is None or item is None or editor.hand.is_busy:
+            return
+        if item.is_locked:
+            editor.say_locked(k)
             return
         if item.stays_in_front:
             editor.apply(t("Do not keep in front"), edits.stop_keeping_in_front(document, k))

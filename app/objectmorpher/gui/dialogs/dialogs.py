@@ -33,6 +33,7 @@ FILTERS = {
     Dialog.SHAPE_OPEN: OBJECT_ENDINGS,
     Dialog.MODEL_OPEN: (MODEL_ENDING,),
     Dialog.MODEL_FOLDER: GIVEN,
+    Dialog.PROFILE_OPEN: (".icc", ".icm"),
 }
 
 

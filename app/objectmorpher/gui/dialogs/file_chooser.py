@@ -35,6 +35,7 @@ VERBS = {
     Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
     Dialog.MASK_OPEN: "Import", Dialog.SHAPE_OPEN: "Use", Dialog.MASK_SAVE: "Export",
     Dialog.MODEL_OPEN: "Use", Dialog.MODEL_FOLDER: "Use",
+    Dialog.PROFILE_OPEN: "Use",
 }  # fmt: skip
 
 
@@ -87,6 +88,8 @@ class FileChooser:
         if not self.is_open:
             return
         endings = ", ".join(sorted({e[1:].upper().replace("JPEG", "JPG") for e in self._endings}))
+        if self._dialog is Dialog.OPEN:  # of which there are twenty
+            endings = t("A photo, a camera RAW file or a session")
         about = t("{endings}. Type a name or a whole path, or choose below.", endings=endings)
         with modal(t(self._dialog.value), WIDTH, about, HEIGHT) as is_shown:
             if is_shown:
@@ -131,7 +134,8 @@ class FileChooser:
         for entry in self._entries:
             chosen = self._draw_entry(editor, entry) or chosen
         if not self._entries:
-            note(t("No such files here."))
+            is_photo = self._dialog is Dialog.OPEN
+            note(t("No photos in this folder.") if is_photo else t("No such files here."))
         imgui.end_child()
         imgui.pop_style_var(2)
         imgui.pop_style_color()

@@ -23,7 +23,8 @@ def draw_card(editor: Editor, rect: Rect) -> None:
     """For the Pose tool; `rect`: the canvas."""
     view = editor.view
     is_posing = view.tool is ToolName.POSE and view.pose.mode is PoseMode.DRAG
-    is_meant = is_posing and editor.is_lifted and view.shown is Shown.COMPOSITE
+    is_free = editor.is_lifted and editor.object is not None and not editor.object.is_locked
+    is_meant = is_posing and is_free and view.shown is Shown.COMPOSITE
     if not is_meant or POSING in editor.settings.dismissed or editor.hand.is_busy:
         return
     if min(rect.width, rect.height) < theme.pt(LEAST_CANVAS) or view.is_before:

@@ -30,6 +30,8 @@ def draw_timeline(editor: Editor) -> None:
         note(t("Keep two poses or more: a video can show the way from one to the next."))
     half = half_width()
     command_button(editor, "add_key", f"{Icon.PLUS}  {t('Add key pose')}", -1)
+    if not editor.keying.count:
+        return
     command_button(editor, "replace_key", t("Replace"), half)
     tooltip(t("The key pose that you were in last becomes what you see now"))
     imgui.same_line()

@@ -10,10 +10,13 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core import compose
 from objectmorpher_core.document.settings import (
     LEAST_FEATHER,
+    MODES,
+    MOST_BLUR,
     MOST_EXPOSURE,
     MOST_FEATHER,
     MOST_SATURATION,
     MOST_SHADOW,
+    MOST_SHARPNESS,
     USUAL_DEFOCUS,
     USUAL_GRAIN,
     USUAL_HARMONY,
@@ -53,6 +56,7 @@ from ..window.landmarks import mark
 from .brush import draw_brush_fields, draw_radius
 from .select import draw_decontaminate
 
+MIXED = dict(zip(MODES, ("Normal", "Multiply", "Screen", "Soft light"), strict=True))
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
 DEGREES = 72.0  # points, width of the direction's field
 THUMB_SHAPE = 3 / 4  # height of a thumbnail by its width
@@ -62,9 +66,9 @@ def draw_compose(editor: Editor) -> None:
     if not editor.is_lifted:
         note(t("Lift an object first."))
         return
-    _draw_finish(editor)  # first: what it changes adds fields below
-    rule()
     _draw_background(editor)
+    rule()
+    _draw_finish(editor)  # before those to which it adds fields
     rule()
     _draw_shadow(editor)
     rule()
@@ -266,12 +270,20 @@ def _draw_finish(editor: Editor) -> None:
         (Number(t("Warmth"), "%+.0f", 0.5, 5.0, 0.0, -100.0, 100.0), "warmth", 100.0),
         (Number(t("Saturation"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100 * MOST_SATURATION),
          "saturation", 100.0),
+        (Number(t("Sharpness"), "%.0f %%", 0.5, 5.0, 0.0, 0.0, 100 * MOST_SHARPNESS),
+         "sharpness", 100.0),
+        (Number(t("Blur"), "%.1f px", 0.05, 0.5, 0.0, 0.0, MOST_BLUR), "blur", 1.0),
     )  # fmt: skip
     for number, name, unit in rows:
         change = number_field(number, unit * getattr(finish, name))
         changed = replace(finish, **{name: change.value / unit})
         _take(editor, change, lambda changed=changed: preview(changed), t("Look of object"))
-    note(t("Exposure in stops; warmth from blue to amber."))
+    choices = [Segment(mode, t(label)) for mode, label in MIXED.items()]
+    mode = segmented("blend mode", choices, finish.blend_mode)
+    if mode != finish.blend_mode:
+        preview(replace(finish, blend_mode=mode))
+        editor.commit(t("Blend mode"))
+    note(t("Exposure in stops; warmth from blue to amber; blur in pixels of the photo."))
 
 
 def _draw_edge(editor: Editor) -> None:

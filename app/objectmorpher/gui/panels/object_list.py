@@ -28,7 +28,7 @@ ROW = 32.0  # points
 BETWEEN = 12.0  # points from a row to the next
 SLACK = 4.0  # points; a press that moves less is a click
 SIDE = 24.0  # of the buttons beside the title
-EYE = 32.0  # from the eye's left to the row's right
+EYE = 32.0  # from the eye's left to the row's right, and from the lock's to it
 NAME = 34.0  # from the row's left to the name
 BUTTONS = (
     (Icon.UP, "forward"), (Icon.DOWN, "backward"), (Icon.COPY, "duplicate"),
@@ -54,7 +54,8 @@ def draw_objects(editor: Editor) -> None:
     shown = editor.objects.listed()
     _draw_title(editor, has_buttons=bool(shown))
     if not shown:
-        note(t("Click something in the photo."))
+        is_asked = editor.selection.pending is not None
+        note(t("Looking for what you clicked…") if is_asked else t("Click something in the photo."))
     top = imgui.get_cursor_screen_pos()
     for k in shown:
         _draw_object(editor, k)
@@ -96,18 +97,29 @@ def _draw_object(editor: Editor, k: int) -> None:
     end = ImVec2(start.x + width, start.y + height)
     # Beside the eye, not below it: what may be overlapped is not pressed in the frame in which
     # the pointer comes to it, and in a slow one that is the press itself.
-    is_hovered = _take_clicks(editor, k, ImVec2(width - theme.pt(EYE), height))
+    beside = theme.pt(EYE if thing.lifted is None else 2 * EYE)
+    is_hovered = _take_clicks(editor, k, ImVec2(width - beside, height))
     draw, is_current = imgui.get_window_draw_list(), k == editor.current
     fill_row(start, end, is_current, is_hovered or k == editor.objects.carried)
     middle = text_top(start, height)
-    icon = Icon.LOCK if thing.stays_in_front else Icon.CUBE if thing.lifted else Icon.SELECT
+    icon = Icon.LAYERS if thing.stays_in_front else Icon.CUBE if thing.lifted else Icon.SELECT
     role = "accent" if is_current else "secondary"
     draw.add_text(ImVec2(start.x + theme.pt(8), middle), theme.u32(role), icon)
     if editor.objects.renaming == k:
         _draw_field(editor, k, start, width)
     else:
-        _draw_name(thing.name, thing.is_visible, ImVec2(start.x + theme.pt(NAME), middle), end)
+        room = ImVec2(end.x - beside, end.y)
+        _draw_name(thing.name, thing.is_visible, ImVec2(start.x + theme.pt(NAME), middle), room)
     if thing.lifted is not None:
+        is_near = imgui.is_mouse_hovering_rect(start, end)
+        if thing.is_locked or is_near:
+            imgui.set_cursor_screen_pos(
+                ImVec2(end.x - theme.pt(2 * EYE - 4), start.y + theme.pt(2))
+            )
+            lock = Icon.LOCK if thing.is_locked else Icon.LOCK_OPEN
+            hint = t("Unlock object") if thing.is_locked else t("Lock object")
+            if icon_button(lock, f"lock{k}", hint):
+                editor.lock(k)
         imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(EYE - 2), start.y + theme.pt(2)))
         eye = Icon.EYE if thing.is_visible else Icon.EYE_OFF
         if icon_button(eye, f"eye{k}", t("Hide or show the object")):
@@ -156,9 +168,9 @@ def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
 
 
 def _draw_name(name: str, is_visible: bool, at: ImVec2, end: ImVec2) -> None:
-    """As much of it as there is room for before the eye."""
+    """As much of it as there is room for before the buttons."""
     draw = imgui.get_window_draw_list()
-    draw.push_clip_rect(at, ImVec2(end.x - theme.pt(EYE + 2), end.y), True)
+    draw.push_clip_rect(at, ImVec2(end.x - theme.pt(2), end.y), True)
     draw.add_text(at, theme.u32("text" if is_visible else "secondary"), name)
     draw.pop_clip_rect()
 

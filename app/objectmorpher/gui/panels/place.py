@@ -81,10 +81,10 @@ def draw_place(editor: Editor) -> None:
         if group.title == "Position":
             _draw_depth(editor, placement)
         gap(12)
-    draw_timeline(editor)
-    gap(12)
     label = t(COMMANDS["reset_place"].label)
     command_button(editor, "reset_place", f"{Icon.RESET}  {label}")
+    gap(12)
+    draw_timeline(editor)
 
 
 def _draw_ground(editor: Editor) -> None:

@@ -63,12 +63,12 @@ def draw_pose(editor: Editor) -> None:
     _draw_symmetry(editor)
     _draw_overlays(editor)
     gap(12)
-    draw_timeline(editor)
-    gap(12)
     half = half_width()
     command_button(editor, "reset_handles", t("All to rest"), half)
     imgui.same_line()
     command_button(editor, "reset_pose", f"{Icon.RESET}  {t('Reset pose')}", half)
+    gap(12)
+    draw_timeline(editor)
 
 
 def _draw_material(editor: Editor, thing: EditObject) -> None:

@@ -230,8 +230,8 @@ def _draw_facts(editor: Editor) -> None:
     if mask is not None:
         share = f"{100 * editor.selection.share:.1f} %"
         facts.append(t("{share} of the photo is selected.", share=share))
-    if adds or removes:
-        facts.append(t("{adds} added, {removes} removed by click.", adds=adds, removes=removes))
+    if removes or adds > 1:
+        facts.append(t("Clicks: {adds} on it, {removes} beside it.", adds=adds, removes=removes))
     if editor.object is not None and editor.object.found is not None:
         facts.append(t("What you painted stays when you click again."))
     if facts:

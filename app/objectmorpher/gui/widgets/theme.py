@@ -104,6 +104,7 @@ class Icon:
     DOWN = "\uf063"
     COPY = "\uf24d"
     LOCK = "\uf023"
+    LOCK_OPEN = "\uf3c1"
     FOLDER = "\uf07b"
     FILE = "\uf15b"
     RESET = "\uf2ea"

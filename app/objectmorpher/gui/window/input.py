@@ -16,7 +16,7 @@ from ...editor.editor import Editor
 from ...editor.feedback import Hover
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.shortcuts import Shortcuts
-from ...editor.view import ToolName
+from ...editor.view import CHANGING, ToolName
 from ...system.texts import t
 from ...tools import navigate
 from ...tools.pointer import Button, Pointer, PointerShape
@@ -248,7 +248,7 @@ class Input:
     def _press(self, editor: Editor, button: Button) -> None:
         """A button goes down at the crosshair."""
         pointer, tool = self.crosshair.pointer(button), TOOLS[editor.view.tool]
-        if not _is_answered(editor):
+        if not _is_answered(editor) or _is_locked(editor, pointer):
             return
         self.shape = tool.hover(editor, pointer)
         editor.message = None
@@ -279,7 +279,11 @@ class Input:
                     stroke = navigate.pan(editor, pressed)
                 elif navigate.is_on_split(editor, pressed):
                     stroke = navigate.drag_split(editor, pressed)
-                elif button is Button.MIDDLE or not _is_answered(editor):
+                elif (
+                    button is Button.MIDDLE
+                    or not _is_answered(editor)
+                    or _is_locked(editor, pressed)
+                ):
                     continue
                 else:
                     editor.message = None
@@ -322,6 +326,17 @@ class Input:
             editor.posing.relax()
         if not is_down:
             editor.hand.move(replace(pointer, is_down=False))
+
+
+def _is_locked(editor: Editor, pointer: Pointer) -> bool:
+    """Whether a press would change the current object, which is locked; that is said."""
+    own, tool = editor.object, editor.view.tool
+    if own is None or not own.is_locked or tool not in CHANGING or tool is ToolName.SELECT:
+        return False
+    if editor.objects.other_at(pointer.xy) is not None:
+        return False
+    editor.say_locked(editor.current)
+    return True
 
 
 def _is_answered(editor: Editor) -> bool:

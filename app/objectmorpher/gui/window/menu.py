@@ -75,8 +75,8 @@ MENUS: dict[str, tuple[str, ...]] = {
         "remove_islands", "add_left_out", "-", "import_mask", "export_mask",
     ),
     "Object": (
-        "lift", "import_shape", "fit_again", "-", "rename", "duplicate", "remove_object", "-",
-        "keep_in_front", "forward", "backward", "to_front", "to_back", "-", "ground", "-",
+        "lift", "import_shape", "fit_again", "-", "rename", "duplicate", "lock", "remove_object",
+        "-", "keep_in_front", "forward", "backward", "to_front", "to_back", "-", "ground", "-",
         "bare", "take_from", "forget_sources", "fill_again", "shadow", "take_shadow",
     ),
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),

@@ -131,7 +131,7 @@ def splat_objects(document: Document, frame: Frame) -> tuple[SplatObject | Canva
         )  # fmt: skip
         if not part.is_painted:
             light = {"gain": look.gain, "relit": look.relit, "grain": look.grain}
-            own = {"saturation": look.saturation, "opacity": look.opacity}
-            item = replace(item, **light, **own, blur=look.blur)
+            own = {"saturation": look.saturation, "opacity": look.opacity, "mode": look.mode}
+            item = replace(item, **light, **own, blur=look.blur, sharpness=look.sharpness)
         found.append(item)
     return tuple(found)

@@ -261,6 +261,7 @@ class Window:
         if scene is None:
             self._renderer.clear()
             return
+        self._renderer.table = self.editor.looking.screen_table()
         view = self.editor.view
         left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
         viewport = (left, size[1] - bottom, view.width, view.height)

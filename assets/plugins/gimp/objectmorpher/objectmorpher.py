@@ -16,6 +16,10 @@ import door  # noqa: E402
 
 PROCEDURE = "plug-in-objectmorpher"
 GROUP = "ObjectMorpher"
+MIXED = {  # GIMP mixes by these in encoded colours, as the file means it
+    "svg:multiply": "MULTIPLY_LEGACY", "svg:screen": "SCREEN_LEGACY",
+    "svg:soft-light": "SOFTLIGHT_LEGACY",
+}  # fmt: skip
 
 
 def send(image, layer, path):
@@ -36,7 +40,7 @@ def bring_back(image, layer, path):
     group = Gimp.GroupLayer.new(image, GROUP)
     image.insert_layer(group, layer.get_parent(), image.get_item_position(layer))
     with tempfile.TemporaryDirectory() as folder:
-        for number, (name, left, top, is_shown, data) in enumerate(door.layers(path)):
+        for number, (name, left, top, is_shown, how, data) in enumerate(door.layers(path)):
             file = Path(folder) / f"{number}.png"
             file.write_bytes(data)
             loaded = Gimp.file_load_layer(
@@ -46,6 +50,8 @@ def bring_back(image, layer, path):
             loaded.set_name(name)
             loaded.set_offsets(left, top)
             loaded.set_visible(is_shown)
+            if how in MIXED:
+                loaded.set_mode(getattr(Gimp.LayerMode, MIXED[how]))
     image.undo_group_end()
     Gimp.displays_flush()
     return group

@@ -47,6 +47,7 @@ def bring_back(document, node, path):
         group.addChildNode(copied, None)
         copied.setPixelData(layer.pixelData(*place), *place)
         copied.setVisible(layer.visible())
+        copied.setBlendingMode(layer.blendingMode())
     source.close()
     document.refreshProjection()
     return group

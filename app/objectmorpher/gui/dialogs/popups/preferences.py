@@ -7,15 +7,16 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from ....editor.editor import Editor
-from ....editor.settings import AUTO, HERE, SERVER
+from ....editor.filing import Dialog
+from ....editor.settings import AS_THEY_ARE, AUTO, HERE, SERVER
 from ....system.motion import FULL, REDUCED
 from ....system.texts import languages, t
 from ...widgets.modal import label, popup
 from ...widgets.segmented import Segment, draw_method, segmented
 from ...widgets.widgets import FILL, button, gap, heading, note
 
-SIZE = (520.0, 580.0)  # points
-WITH_SERVER = (520.0, 678.0)
+SIZE = (520.0, 660.0)  # points
+WITH_SERVER = (520.0, 758.0)
 METHODS = {"segment": "Select", "lift": "Lift", "inpaint": "Fill in"}  # stage -> label
 SCALES = (0.0, 1.0, 1.25, 1.5, 2.0)  # 0: the monitor's
 
@@ -60,6 +61,26 @@ def _draw_look(editor: Editor) -> None:
         Segment(REDUCED, t("Reduced"), t("Nothing fades or blinks")),
     )
     _prefer(editor, "motion", segmented("motion", motions, settings.motion))
+    _draw_screen(editor)
+
+
+def _draw_screen(editor: Editor) -> None:
+    """By which profile the photo is shown."""
+    label(t("Screen colours"))
+    chosen = editor.settings.screen_profile
+    file = chosen if chosen not in (AUTO, AS_THEY_ARE) else ""
+    kinds = (
+        Segment(AUTO, t("The system's")),
+        Segment(file, t("A profile…"), file or t("An ICC file of this screen")),
+        Segment(AS_THEY_ARE, t("As they are"), t("The photo's numbers, whatever they mean")),
+    )
+    wanted = segmented("screen", kinds, chosen)
+    if wanted == file and chosen != file:
+        editor.filing.wanted = Dialog.PROFILE_OPEN
+    else:
+        _prefer(editor, "screen_profile", wanted)
+    if editor.looking.screen_profile() is None and chosen != AS_THEY_ARE:
+        note(t("No profile of the screen was found: it is taken for sRGB."))
 
 
 def _draw_files(editor: Editor) -> None:

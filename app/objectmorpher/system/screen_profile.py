@@ -1,0 +1,110 @@
+"""The screen's colour profile as the system knows it: X11's `_ICC_PROFILE`, Windows, macOS.
+
+Wayland tells programs none; there, and for a second screen, the user names a file in Preferences.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import logging
+import os
+import sys
+from pathlib import Path
+
+log = logging.getLogger(__name__)
+
+MOST = 16 << 20  # bytes of a profile; a screen's has a few thousand
+ANY_TYPE = 0
+
+
+def read_profile(path: Path) -> bytes | None:
+    """Return a profile file's bytes; None where there are none to be read."""
+    try:
+        if path.stat().st_size <= MOST:
+            return path.read_bytes()
+    except OSError as error:
+        log.warning("the screen's profile cannot be read: %s", error)
+    return None
+
+
+def system_profile() -> bytes | None:
+    """Return the main screen's profile; None where the system tells none."""
+    try:
+        if sys.platform == "win32":
+            return _of_windows()
+        return _of_macos() if sys.platform == "darwin" else _of_x11()
+    except (OSError, AttributeError, ValueError, ctypes.ArgumentError) as error:
+        log.info("the system does not tell the screen's profile: %s", error)
+        return None
+
+
+def _of_windows() -> bytes | None:
+    from PIL import ImageCms
+
+    found = ImageCms.get_display_profile()  # by GetICMProfile
+    return None if found is None else found.tobytes()
+
+
+def _of_macos() -> bytes | None:
+    frameworks = "/System/Library/Frameworks"
+    graphics = ctypes.CDLL(f"{frameworks}/CoreGraphics.framework/CoreGraphics")
+    foundation = ctypes.CDLL(f"{frameworks}/CoreFoundation.framework/CoreFoundation")
+    for function in (graphics.CGDisplayCopyColorSpace, graphics.CGColorSpaceCopyICCData):
+        function.restype = ctypes.c_void_p
+    graphics.CGDisplayCopyColorSpace.argtypes = [ctypes.c_uint32]
+    graphics.CGColorSpaceCopyICCData.argtypes = [ctypes.c_void_p]
+    foundation.CFDataGetBytePtr.restype = ctypes.c_void_p
+    foundation.CFDataGetLength.restype = ctypes.c_long
+    for function in (
+        foundation.CFDataGetBytePtr, foundation.CFDataGetLength, foundation.CFRelease,
+    ):  # fmt: skip
+        function.argtypes = [ctypes.c_void_p]
+    space = graphics.CGDisplayCopyColorSpace(graphics.CGMainDisplayID())
+    if not space:
+        return None
+    data = graphics.CGColorSpaceCopyICCData(space)
+    foundation.CFRelease(space)
+    if not data:
+        return None
+    length = foundation.CFDataGetLength(data)
+    profile = ctypes.string_at(foundation.CFDataGetBytePtr(data), length)
+    foundation.CFRelease(data)
+    return profile
+
+
+def _of_x11() -> bytes | None:
+    """By the ICC Profiles in X Specification."""
+    name = ctypes.util.find_library("X11")
+    if not os.environ.get("DISPLAY") or name is None:
+        return None
+    x11 = ctypes.CDLL(name)
+    pointer, long, unsigned = ctypes.c_void_p, ctypes.c_long, ctypes.c_ulong
+    x11.XOpenDisplay.restype, x11.XOpenDisplay.argtypes = pointer, [ctypes.c_char_p]
+    x11.XDefaultRootWindow.restype, x11.XDefaultRootWindow.argtypes = unsigned, [pointer]
+    x11.XInternAtom.restype = unsigned
+    x11.XInternAtom.argtypes = [pointer, ctypes.c_char_p, ctypes.c_int]
+    x11.XGetWindowProperty.argtypes = [
+        pointer, unsigned, unsigned, long, long, ctypes.c_int, unsigned, pointer, pointer, pointer,
+        pointer, pointer,
+    ]  # fmt: skip
+    x11.XFree.argtypes = x11.XCloseDisplay.argtypes = [pointer]
+    display = x11.XOpenDisplay(None)
+    if not display:
+        return None
+    try:
+        atom = x11.XInternAtom(display, b"_ICC_PROFILE", True)
+        if not atom:
+            return None
+        kind, bits, data = unsigned(), ctypes.c_int(), pointer()
+        count, left = unsigned(), unsigned()
+        told = [ctypes.byref(value) for value in (kind, bits, count, left, data)]
+        root = x11.XDefaultRootWindow(display)
+        x11.XGetWindowProperty(display, root, atom, 0, MOST // 4, False, ANY_TYPE, *told)
+        if not data.value:
+            return None
+        profile = ctypes.string_at(data.value, count.value) if bits.value == 8 else None
+        x11.XFree(data)
+        return profile or None
+    finally:
+        x11.XCloseDisplay(display)

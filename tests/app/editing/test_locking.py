@@ -1,0 +1,72 @@
+"""A locked object is not changed by a slip: not by a stroke, a field, a command or a job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from editor_steps import CENTRE, duplicate
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher.gui.window.input import _is_locked
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher_core.document import edits, lock_edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.settings import Finish
+from objectmorpher_core.session.file import decode_session, encode_session
+
+
+@pytest.fixture
+def locked(editor: Editor, ball: Document) -> Iterator[Editor]:
+    """The ball, locked, and a copy of it at the left, which is free."""
+    duplicate(editor, ball, -60.0, 0.0)
+    editor.current = 0
+    run(editor, "lock")
+    return editor
+
+
+def test_nothing_changes_it_but_its_name_and_whether_it_is_seen(locked: Editor) -> None:
+    editor, before = locked, locked.committed
+    assert before is not None and editor.object is not None and editor.object.is_locked
+    editor.placing.move_to(Placement(move=(9.0, 0.0)))
+    assert editor.preview is None
+    editor.commit("Move object")
+    editor.composing.preview_finish(Finish(opacity=0.5))
+    editor.commit("Look of object")
+    for name in ("grow", "keep_in_front", "shadow", "reset_pose", "remove_object"):
+        run(editor, name)
+    assert editor.committed is before
+    assert "locked" in editor.message.text
+    editor.objects.rename(0, "Moon")
+    editor.objects.toggle_visible(0)
+    item = editor.object
+    assert (item.name, item.is_visible, item.is_locked) == ("Moon", False, True)
+    again = decode_session(encode_session(editor.committed))
+    assert [o.is_locked for o in again.objects] == [True, False]
+
+
+def test_it_cannot_be_pointed_at_and_the_others_can_be_changed(locked: Editor) -> None:
+    editor = locked
+    editor.view.tool = ToolName.PLACE
+    at = Pointer(*editor.view.canvas_from_image(CENTRE), is_down=True)
+    assert _is_locked(editor, at)
+    editor.objects.choose(1)
+    assert not _is_locked(editor, at) and editor.objects.other_at(at.xy) is None
+    editor.placing.move_to(Placement(move=(-50.0, 5.0)))
+    editor.commit("Move object")
+    assert editor.object.placement.move == (-50.0, 5.0)
+
+
+def test_its_button_unlocks_it_and_undo_covers_both(locked: Editor) -> None:
+    editor, before = locked, locked.committed
+    run(editor, "remove_object")
+    assert editor.message is not None and editor.message.action is not None
+    editor.message.action.run()
+    assert not editor.object.is_locked
+    run(editor, "undo")
+    assert editor.committed is before
+    run(editor, "undo")
+    assert not editor.object.is_locked
+    assert lock_edits.locked_change(before, edits.remove_object(before, 0)) is before.objects[0]
