@@ -23,7 +23,8 @@ from .silhouette import ReliefSilhouette
 # The outlines of a silhouette as lines, along which a surface has its rim.
 
 SHORTEST = 4  # cells of a rim that is looked at
-STAIRS = 1.5  # cells, over which the staircase of an outline is evened
+STAIRS, CORNERS = 4.0, 1.5  # cells, over which an outline's staircase is evened, and at corners
+STAIR = 0.7  # cells: what evening moves by more is no stair
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,12 @@ def rim_lines(inside: Mask) -> list[RimLine]:
         cells = ring[:, 0]
         if len(cells) < SHORTEST:
             continue
-        xy = gaussian_filter1d(cells.astype(np.float64), STAIRS, axis=0, mode="wrap")
+        smooth, xy = (
+            gaussian_filter1d(cells.astype(np.float64), over, axis=0, mode="wrap")
+            for over in (STAIRS, CORNERS)
+        )
+        share = 1 / (1 + (np.linalg.norm(smooth - xy, axis=1) / STAIR) ** 4)
+        xy += share[:, None] * (smooth - xy)
         way = np.roll(xy, -1, axis=0) - np.roll(xy, 1, axis=0)
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
         # The object lies to one side of all lines, at the centres of its outermost cells.
@@ -292,7 +298,7 @@ def _inner(
     sheets = [(SurfacePoints(xy, height, normals, ~no, no, no, behind), 0)]
     assert body.cuts is not None, "there are overlaps"
     beneath = (inner.own_back, BACK, inner.own_beside), (inner.beneath, FRONT, inner.beside)
-    ends = rim_lines(inner.is_apart)
+    ends = [] if body.behind is None else rim_lines(inner.is_apart)
     for field, side, beside in beneath:
         down, right = (slope / cell for slope in body.cuts.gradient(field))
         fields = np.stack([field, right, down], -1)

@@ -27,8 +27,9 @@ HELD = 0.97  # x an ellipse's area, that is within the mask
 SEEN_LEAN = 0.35  # x a rim's own slope, that the network sees of it
 LEVEL = 0.25  # slope, below which a rim may as well face the camera
 SIZE = 100  # px, a lip's radius in the picture in which it is looked for
-# How far off, x its radius, how much wider and how much more tilted it may be than the outline says.
+# How far off it may be, x its radius, how much wider and how much more tilted.
 FREE = 0.3, 0.3, 0.25, 0.12, 0.12
+USUAL = 0.05  # x an edge all around: what it has to gain from each of them
 EDGES = 0.08, 0.05, 0.03, 0.02, 0.012  # x its radius, how wide an edge is; finer each time
 AROUND = 60  # places of a lip that are looked at
 TRIED, FINER = 5, 0.6  # values of each number, and how much nearer they lie the next time
@@ -217,7 +218,7 @@ def _further(first: Rim, rest: F64, error: float) -> Rim | None:
 
 
 def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) -> Rim:
-    """`lip` where the photo's edges are, of the object `mask` (H, W); as near to the axis as it can.
+    """`lip` where the photo's edges are, of the object `mask` (H, W), and nearest to the axis.
 
     Of a lip the outline shows an arc only, and a cup stands hardly ever amid its saucer.
     """
@@ -232,13 +233,15 @@ def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) ->
     smooth = cv2.GaussianBlur(to_u8(pixels), (0, 0), 0.5 / scale)
     shown = cv2.warpAffine(smooth, warp, wide, flags=how, borderMode=cv2.BORDER_REPLICATE)
     own = cv2.warpAffine(mask.astype(np.uint8), warp, wide)
-    edges = np.maximum(_edges(shown), cv2.morphologyEx(own, cv2.MORPH_GRADIENT, np.ones((3, 3))))
+    outline = cv2.morphologyEx(own, cv2.MORPH_GRADIENT, np.ones((3, 3)))
+    edges = np.maximum(_edges(shown) * own, outline.astype(np.float32))
     helper = np.cross(lip.normal, [0.0, 0.0, 1.0])
     across = helper / np.linalg.norm(helper)
     down = np.cross(lip.normal, across)
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(turn), np.sin(turn)])
-    best, spans = np.array([0.0, 0.0, 1.0, 0.0, 0.0]), np.array(FREE)
+    still = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+    best, spans = still, np.array(FREE)
     for width in EDGES:
         blurred = cv2.GaussianBlur(edges, (0, 0), width * SIZE)
         steps = best[:, None] + spans[:, None] * np.linspace(-1, 1, TRIED)
@@ -251,7 +254,9 @@ def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) ->
         places = lip.centre + lip.radius * (places @ np.stack([across, down, lip.normal]))
         at = places[..., :2] / places[..., 2:] * camera.focal + [camera.cx, camera.cy]
         at = np.rint((at - corner) * scale).astype(int).clip(0, wide[0] - 1)
-        best = trials[int(np.argmax(blurred[at[..., 1], at[..., 0]].mean(1)))]
+        seen = blurred[at[..., 1], at[..., 0]].mean(1)
+        likely = seen - USUAL * (((trials - still) / FREE) ** 2).sum(1)
+        best = trials[int(np.argmax(likely))]
         spans = FINER * spans
     centre = lip.centre + lip.radius * (best[0] * across + best[1] * down)
     normal = lip.normal + best[3] * across + best[4] * down
@@ -265,6 +270,7 @@ def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) ->
 
 def _edges(picture: np.ndarray) -> F32:
     """(h, w) in [0, 1] how much colours (h, w, 3) u8 change there."""
-    slopes = [cv2.Sobel(picture.astype(np.float32), cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1))]
-    strong = np.sqrt(sum(slope**2 for slope in slopes).sum(-1))
+    levels = picture.astype(np.float32)
+    x, y = (cv2.Sobel(levels, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1)))
+    strong = np.sqrt((x * x + y * y).sum(-1))
     return np.asarray(strong / (strong + EDGE), np.float32)

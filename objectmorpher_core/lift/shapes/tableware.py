@@ -157,10 +157,10 @@ class Stack(NamedTuple):
         nearest = nearest_in(known)  # what sticks out, and what is around, goes on
         near, far = near.ravel()[nearest], far.ravel()[nearest]
         stands = outline.inside & stands.ravel()[nearest]
-        plane, level = np.log(rims[0].depth(tangents)), before - np.median((before - near)[known])
-        beyond = np.abs(level - plane) < np.abs(level - near)  # a spoon, beside the lip
-        beyond = _mostly(beyond, outline.inside & ~known)
-        near, far = (np.where(beyond, plane, part) for part in (near, far))
+        plane = np.log(rims[0].depth(tangents))
+        beyond = _touching(outline.inside & ~known, lies & ~stands)  # a spoon beside the lip
+        nearest = nearest_in(outline.inside)
+        near, far = (np.where(beyond, plane, part).ravel()[nearest] for part in (near, far))
         stands, lies = stands & ~beyond, lies | beyond
         # It closes at its limb: no wall stands there.
         beside = cv2.dilate((outline.inside & ~stands).astype(np.uint8), np.ones((5, 5))) > 0
@@ -226,12 +226,11 @@ def _stacked(
     )  # fmt: skip
 
 
-def _mostly(is_so: Mask, where: Mask) -> Mask:
-    """(h, w) the pieces of `where` (h, w) of which most `is_so` (h, w)."""
-    count, pieces = cv2.connectedComponents(where.astype(np.uint8))
-    pieces = np.asarray(pieces)
-    shares = [0.0] + [float(is_so[pieces == k].mean()) for k in range(1, count)]
-    return np.array(shares)[pieces] > 0.5
+def _touching(where: Mask, other: Mask) -> Mask:
+    """(h, w) the pieces of `where` (h, w) that lie beside `other` (h, w)."""
+    _, pieces = cv2.connectedComponents(where.astype(np.uint8))
+    beside = cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return where & np.isin(pieces, np.unique(np.asarray(pieces)[where & beside]))
 
 
 def _log_depth(inverse: F64) -> F64:
@@ -292,7 +291,8 @@ class Around(NamedTuple):
 
         As high, or as far from the axis, and about as far around it.
         """
-        found = np.stack(np.indices(source.shape)[::-1], -1)
+        rows, columns = np.indices(source.shape)
+        found = np.stack([columns, rows], -1)
         if source.any() and wanted.any():
             tree = KDTree(self._places(level)[source])
             _, index = tree.query(other._places(level)[wanted])
