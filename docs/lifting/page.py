@@ -147,18 +147,31 @@ a thing as a cup on a saucer; what was looked at meanwhile is the photo of the c
 | **mean of the ten held out** | 18.0, 19.3 | 15.5, 16.8 | 17.2, 18.7 |
 
 Where a turned cup was wrong was mostly its lip: of that the outline shows an arc only, and it was
-thought to lie about the saucer's middle. The coffee's was 20 of 240 px too high in front, so the
+thought to lie about the saucer's middle. The coffee's was 16 px too high in front, so the
 white of the porcelain hung down the turned wall. Now a lip is where the photo's edges are, and the
 cup has an axis of its own; its walls and its saucer have the colours that they have elsewhere where
 the photo is drawn out; what is hidden ends in lines as the outline does; and what sticks out beyond
 the saucer beside the lip, a spoon, lies as the saucer does. The serration of about a pixel at plate
 and cup was the staircase of the silhouette's cells, along which the rim's points lie: 1.5 cells
-did not even it where the outline is nearly level. Four do, but for corners. Evening the depth along
+did not even it where the outline is nearly level. Four do, but for corners, by a filter that does not
+shrink (Taubin 1995): the plain one cost the ring 0.4 dB. Evening the depth along
 the rim did nothing. Four times as many Gaussians take the plate's wobble from 1.55 to 1.42 only. PSNR
 in dB and wobble, before and after both; the photo of the coffee was looked at meanwhile, and the cup,
 on which a lip without bounds failed:
 
-%TABLE%
+|  | before: turn 20 | turn 35 | pitch 20 | after: turn 20 | turn 35 | pitch 20 |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: |
+| plate | 23.2, 1.51 | 22.3, 1.54 | 21.5, 1.45 | 23.2, 1.38 | 22.1, 1.49 | 21.6, 1.33 |
+| cup | 27.3, 1.45 | 24.7, 1.70 | 28.0, 1.63 | 27.2, 1.43 | 24.9, 1.81 | 28.4, 1.53 |
+| ring | 18.8, 1.46 | 16.8, 1.20 | 17.5, 1.28 | 18.9, 1.35 | 16.9, 1.16 | 17.5, 1.28 |
+| ball | 26.9, 1.24 | 23.7, 1.30 | 26.1, 1.20 | 26.5, 1.32 | 23.6, 1.22 | 26.1, 1.19 |
+| duck | 18.5, 1.06 | 16.6, 0.92 | 18.1, 1.02 | 18.5, 1.05 | 16.6, 0.91 | 18.1, 1.01 |
+| bunny | 14.7, 0.85 | 12.7, 0.78 | 15.5, 1.20 | 14.7, 0.84 | 12.7, 0.78 | 15.5, 1.22 |
+| teddy | 17.9, 0.99 | 15.2, 0.87 | 18.0, 1.03 | 17.8, 0.98 | 15.2, 0.84 | 18.0, 0.99 |
+
+The points of a surface lie otherwise afterwards, and another seed alone moves the ring by 0.1 to
+0.3 dB: the ball's 0.4 dB at 20 degrees and the plate's 0.1 at 35 are as large as that, and were
+not looked into. The cup's wobble at 35 degrees did not fall.
 
 Heeding more of the waves that the network sees behind loses 0.1 to 0.2 dB (the duck gains as much,
 the ball loses 1.8).
@@ -204,8 +217,8 @@ and the colour ball, which fill their photos, get corners; the pagoda is selecte
 leans; of the moon and of the cell a piece of ground is selected, which has a ragged edge. Nothing
 is torn. Streaks or flat places are more than 2 % of what is newly shown on all but horse, coins,
 moon and logo, and wobble is above 1.2 of colour ball (1.5) and bowl (1.25) at the worst of eight
-turns, and was of the coffee (1.6; 1.3 after what follows, at pitch -20). All rows but the coffee's
-are older than that.
+turns; of the coffee, which was above 1.6, it is 1.23. The other rows are older than what made that
+so, and are to be drawn again.
 """
 STEREO = """## A photographed thing whose shape is known
 

@@ -41,6 +41,12 @@ class RimLine:
         return np.r_[0.0, np.cumsum(steps)]
 
 
+def _smooth(ring: F64, over: float) -> F64:
+    """A closed line (n, 2) without waves, as wide as it was (Taubin 1995)."""
+    first = gaussian_filter1d(ring, over, axis=0, mode="wrap")
+    return first + gaussian_filter1d(ring - first, over, axis=0, mode="wrap")
+
+
 def rim_lines(inside: Mask) -> list[RimLine]:
     """Return all outlines of cells (h, w) that are long enough to have a shape."""
     found, _ = cv2.findContours(inside.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
@@ -49,10 +55,7 @@ def rim_lines(inside: Mask) -> list[RimLine]:
         cells = ring[:, 0]
         if len(cells) < SHORTEST:
             continue
-        smooth, xy = (
-            gaussian_filter1d(cells.astype(np.float64), over, axis=0, mode="wrap")
-            for over in (STAIRS, CORNERS)
-        )
+        smooth, xy = (_smooth(cells.astype(np.float64), over) for over in (STAIRS, CORNERS))
         share = 1 / (1 + (np.linalg.norm(smooth - xy, axis=1) / STAIR) ** 4)
         xy += share[:, None] * (smooth - xy)
         way = np.roll(xy, -1, axis=0) - np.roll(xy, 1, axis=0)
