@@ -153,11 +153,11 @@ cup has an axis of its own; its walls and its saucer have the colours that they 
 the photo is drawn out; what is hidden ends in lines as the outline does; and what sticks out beyond
 the saucer beside the lip, a spoon, lies as the saucer does. The serration of about a pixel at plate
 and cup was the staircase of the silhouette's cells, along which the rim's points lie: 1.5 cells
-did not even it where the outline is nearly level. Four do, but for corners, by a filter that does not
-shrink (Taubin 1995): the plain one cost the ring 0.4 dB. Evening the depth along
-the rim did nothing. Four times as many Gaussians take the plate's wobble from 1.55 to 1.42 only. PSNR
-in dB and wobble, before and after both; the photo of the coffee was looked at meanwhile, and the cup,
-on which a lip without bounds failed:
+did not even it where the outline is nearly level. Four do, but for corners, by a filter that does
+not shrink (Taubin 1995): the plain one cost the ring 0.4 dB. Evening the depth along the rim did
+nothing, and four times as many Gaussians take the plate's wobble from 1.55 to 1.42 only. PSNR in dB
+and wobble, before and after both; the photo of the coffee was looked at meanwhile, and the cup, on
+which a lip without bounds failed:
 
 |  | before: turn 20 | turn 35 | pitch 20 | after: turn 20 | turn 35 | pitch 20 |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: |
