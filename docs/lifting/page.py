@@ -146,6 +146,36 @@ a thing as a cup on a saucer; what was looked at meanwhile is the photo of the c
 | cup | 19.8, 26.9 | 17.8, 24.3 | 18.6, 27.1 |
 | **mean of the ten held out** | 18.0, 19.3 | 15.5, 16.8 | 17.2, 18.7 |
 
+Where a turned cup was wrong was mostly its lip: of that the outline shows an arc only, and it was
+thought to lie about the saucer's middle. The coffee's was 16 px too high in front, so the
+white of the porcelain hung down the turned wall. Now a lip is where the photo's edges are, and the
+cup has an axis of its own; its walls and its saucer have the colours that they have elsewhere where
+the photo is drawn out; what is hidden ends in lines as the outline does; and what sticks out beyond
+the saucer beside the lip, a spoon, lies as the saucer does. The serration of about a pixel at plate
+and cup was the staircase of the silhouette's cells, along which the rim's points lie: 1.5 cells
+did not even it where the outline is nearly level. Four do, but for corners, by a filter that does
+not shrink (Taubin 1995): the plain one cost the ring 0.4 dB. Evening the depth along the rim did
+nothing, and four times as many Gaussians take the plate's wobble from 1.55 to 1.42 only. PSNR in dB
+and wobble, before and after both; the photo of the coffee was looked at meanwhile, and the cup, on
+which a lip without bounds failed:
+
+|  | before: turn 20 | turn 35 | pitch 20 | after: turn 20 | turn 35 | pitch 20 |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: |
+| plate | 23.2, 1.51 | 22.3, 1.54 | 21.5, 1.45 | 23.2, 1.43 | 22.1, 1.50 | 21.5, 1.35 |
+| box | 23.9, 1.71 | 22.8, 1.85 | 23.1, 1.71 | 23.8, 1.66 | 22.7, 1.83 | 23.1, 1.71 |
+| cup | 27.3, 1.45 | 24.7, 1.70 | 28.0, 1.63 | 27.2, 1.43 | 24.9, 1.81 | 28.4, 1.53 |
+| ring | 18.8, 1.46 | 16.8, 1.20 | 17.5, 1.28 | 18.9, 1.35 | 16.9, 1.16 | 17.5, 1.28 |
+| ball | 26.9, 1.24 | 23.7, 1.30 | 26.1, 1.20 | 26.5, 1.32 | 23.6, 1.22 | 26.1, 1.19 |
+| duck | 18.5, 1.06 | 16.6, 0.92 | 18.1, 1.02 | 18.5, 1.05 | 16.6, 0.91 | 18.1, 1.01 |
+| bunny | 14.7, 0.85 | 12.7, 0.78 | 15.5, 1.20 | 14.7, 0.84 | 12.7, 0.78 | 15.5, 1.22 |
+| teddy | 17.9, 0.99 | 15.2, 0.87 | 18.0, 1.03 | 17.8, 0.98 | 15.2, 0.84 | 18.0, 0.99 |
+
+Plate and box are with corners from 0.4 cells on, which the box needs: with 0.7, as the other rows
+are, it lost up to 0.3 dB. The rest of the twenty was not measured before and after.
+The points of a surface lie otherwise afterwards, and another seed alone moves the ring by 0.1 to
+0.3 dB: the ball's 0.4 dB at 20 degrees and the plate's 0.1 at 35 are as large as that, and were
+not looked into. The cup's wobble at 35 degrees did not fall.
+
 Heeding more of the waves that the network sees behind loses 0.1 to 0.2 dB (the duck gains as much,
 the ball loses 1.8).
 
@@ -181,16 +211,17 @@ object hides of another counts as invented although it may stay hidden.
 
 Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right, the astronaut
 and the coffee nearly so: her head is a little deep, and what is not shown of hair and collar is
-plain; the coffee's handle and spoon lie flat on the saucer, the lip's photo is stretched down the
-cup's side where that turns into view, and the rim of the part that was hidden is a little ragged.
+plain; the coffee's handle and spoon lie flat on the saucer, the upper end of the spoon's bowl is
+smeared where it covers the cup, and what turns into view of the cup's side is blurred.
 The horse is a sheet, as it was drawn. What does not look right: from 25 degrees on a band along the
 cheek of the cat, whose outline is wavy there; the fig in the bowl becomes narrow, and slides at 35;
 the photographer's back has a grey band; the clock, which is blurred, has a double edge; the retina
 and the colour ball, which fill their photos, get corners; the pagoda is selected in part, and
 leans; of the moon and of the cell a piece of ground is selected, which has a ragged edge. Nothing
 is torn. Streaks or flat places are more than 2 % of what is newly shown on all but horse, coins,
-moon and logo, and wobble is above 1.2 of coffee (1.6), colour ball (1.5) and bowl (1.25) at the
-worst of eight turns.
+moon and logo, and wobble is above 1.2 of colour ball (1.5) and bowl (1.25) at the worst of eight
+turns; of the coffee, which was above 1.6, it is 1.23. The other rows are older than what made that
+so, and are to be drawn again.
 """
 STEREO = """## A photographed thing whose shape is known
 

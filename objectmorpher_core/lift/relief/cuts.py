@@ -150,6 +150,8 @@ class Behind(NamedTuple):
     front: F64  # px, of the next part
     own_beside: I64  # (h, w, 2) column and row of a cell that has the colours of the own back
     beside: I64  # likewise of the next part
+    stands: Mask  # where a part ends before the next one
+    seen_beside: I64  # likewise of what is seen, from where that is its own and clear
 
 
 def overlaps_of(

@@ -7,7 +7,7 @@ to cover it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
@@ -23,7 +23,8 @@ from .silhouette import ReliefSilhouette
 # The outlines of a silhouette as lines, along which a surface has its rim.
 
 SHORTEST = 4  # cells of a rim that is looked at
-STAIRS = 1.5  # cells, over which the staircase of an outline is evened
+STAIRS, CORNERS = 4.0, 1.5  # cells, over which an outline's staircase is evened, and at corners
+STAIR = 0.4  # cells: what evening moves by more is no stair
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,12 @@ class RimLine:
         return np.r_[0.0, np.cumsum(steps)]
 
 
+def _smooth(ring: F64, over: float) -> F64:
+    """A closed line (n, 2) without waves, as wide as it was (Taubin 1995)."""
+    first = gaussian_filter1d(ring, over, axis=0, mode="wrap")
+    return first + gaussian_filter1d(ring - first, over, axis=0, mode="wrap")
+
+
 def rim_lines(inside: Mask) -> list[RimLine]:
     """Return all outlines of cells (h, w) that are long enough to have a shape."""
     found, _ = cv2.findContours(inside.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
@@ -48,7 +55,9 @@ def rim_lines(inside: Mask) -> list[RimLine]:
         cells = ring[:, 0]
         if len(cells) < SHORTEST:
             continue
-        xy = gaussian_filter1d(cells.astype(np.float64), STAIRS, axis=0, mode="wrap")
+        smooth, xy = (_smooth(cells.astype(np.float64), over) for over in (STAIRS, CORNERS))
+        share = 1 / (1 + (np.linalg.norm(smooth - xy, axis=1) / STAIR) ** 4)
+        xy += share[:, None] * (smooth - xy)
         way = np.roll(xy, -1, axis=0) - np.roll(xy, 1, axis=0)
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
         # The object lies to one side of all lines, at the centres of its outermost cells.
@@ -66,6 +75,7 @@ OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
 INSET = 0.6  # x mean spacing: so far beyond its outermost points a surface is drawn
 IN_LINE = 0.85  # x mean spacing: how far points along an outline are apart
+COVERED = 0.6  # x mean spacing: so far beyond a part's end it is drawn over what is behind
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
 WITHIN = 0.45  # cells from a near cell to its wall: just before the far one begins
 MIN_SPACING = 1.0  # px: more points than pixels carry nothing
@@ -96,21 +106,26 @@ def spread(
     proportion to the true area, then thinned to one spacing in 3D.
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
-    lines = rim_lines(body.silhouette.inside)
+    lines, ends = rim_lines(body.silhouette.inside), []
+    if body.behind is not None:
+        ends = rim_lines(body.behind.stands)
     total = sum(area.sum() for area in areas) + _wall_area(body, lines) + _inner_area(body)
     spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
     density = OVERSAMPLING / spacing**2  # candidates per px^2
-    chains = [_chain(body, lines, side, spacing) for side in (FRONT, BACK)]
+    chains = [_chain(body, lines + ends, FRONT, spacing), _chain(body, lines, BACK, spacing)]
     drawn = [_draw(body.silhouette, area * density, rng) for area in areas]
     drawn = [np.vstack([chain, xy]) for chain, xy in zip(chains, drawn, strict=True)]
-    around = [_brim(body, band + BRIM * spacing, density, rng), *_inner(body, density, rng)]
+    around = [(_brim(body, band + BRIM * spacing, density, rng), 0)]
+    around += _inner(body, spacing, density, rng)
     # Most candidates of the sheets are dropped: their normals are found when that is done.
     clouds = [(xy, body.height(xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
-    clouds += [(surface.xy, surface.height) for surface in around]
-    first = [len(chain) for chain in chains] + [0] * len(around)
+    clouds += [(surface.xy, surface.height) for surface, _ in around]
+    first = [len(chain) for chain in chains] + [count for _, count in around]
     front, back, *others = _thinned(clouds, first, spacing, rng)
     sheets = [_sheet(body, drawn[0][front], FRONT), _sheet(body, drawn[1][back], BACK)]
-    sheets += [surface.select(kept) for surface, kept in zip(around, others, strict=True)]
+    if body.behind is not None:
+        sheets[0] = _own(sheets[0], body, COVERED * spacing)
+    sheets += [surface.select(kept) for (surface, _), kept in zip(around, others, strict=True)]
     sheets.append(_wall(body, lines, spacing))
     return _joined(sheets), spacing
 
@@ -170,6 +185,22 @@ def _sheet(body: ReliefBody, xy: F64, side: float) -> SurfacePoints:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     is_front = np.full(len(xy), side == FRONT)
     return SurfacePoints(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
+
+
+def _own(front: SurfacePoints, body: ReliefBody, covered: float) -> SurfacePoints:
+    """`front` with the colours of its own parts, which show where the photo is drawn out too far.
+
+    Within `covered` px of what stands before it, that is what the photo shows.
+    """
+    outline, behind = body.silhouette, body.behind
+    assert behind is not None, "parts are known"
+    j, i = np.clip(
+        np.rint(outline.grid_xy(front.xy)).astype(int), 0, np.array(outline.shape[::-1]) - 1
+    ).T
+    away = cv2.distanceTransform((~behind.stands).astype(np.uint8), cv2.DIST_L2, 5) * outline.cell
+    is_beneath = ~behind.stands & (away < covered)
+    source = outline.photo_xy(behind.seen_beside.astype(np.float64))
+    return replace(front, is_seen=front.is_seen & ~is_beneath[i, j], color_xy=source[i, j])
 
 
 def _wall_area(body: ReliefBody, lines: list[RimLine]) -> float:
@@ -245,8 +276,13 @@ def _inner_area(body: ReliefBody) -> float:
     return walls + 2 * cell**2 * int(inner.is_apart.sum())
 
 
-def _inner(body: ReliefBody, density: float, rng: np.random.Generator) -> list[SurfacePoints]:
-    """Between parts of the object: the sides of near ones, their backs, and what is beneath."""
+def _inner(
+    body: ReliefBody, spacing: float, density: float, rng: np.random.Generator
+) -> list[tuple[SurfacePoints, int]]:
+    """Between parts of the object: the sides of near ones, their backs, and what is beneath.
+
+    With each, how many of its points come first: they lie along its end.
+    """
     inner, outline = body.overlaps, body.silhouette
     if inner is None:
         return []
@@ -262,16 +298,19 @@ def _inner(body: ReliefBody, density: float, rng: np.random.Generator) -> list[S
     normals = np.column_stack([walls.step[which], np.zeros(len(which))]).astype(np.float64)
     no = np.zeros(len(which), bool)
     behind = outline.photo_xy(walls.near[which] - walls.step[which].astype(np.float64))
-    sheets = [SurfacePoints(xy, height, normals, ~no, no, no, behind)]
+    sheets = [(SurfacePoints(xy, height, normals, ~no, no, no, behind), 0)]
     assert body.cuts is not None, "there are overlaps"
     beneath = (inner.own_back, BACK, inner.own_beside), (inner.beneath, FRONT, inner.beside)
+    ends = [] if body.behind is None else rim_lines(inner.is_apart)
     for field, side, beside in beneath:
         down, right = (slope / cell for slope in body.cuts.gradient(field))
+        fields = np.stack([field, right, down], -1)
         area = np.where(inner.is_apart, cell**2 * np.sqrt(1 + down**2 + right**2), 0.0)
-        xy = _draw(outline, area * density, rng)
+        chains = [_end(line, fields, outline, spacing) for line in ends]
+        xy = np.concatenate([*chains, _draw(outline, area * density, rng)])
         at = outline.grid_xy(xy)
         near = body.cuts.settled(at)
-        height, dx, dy = bilinear(np.stack([field, right, down], -1), near).T
+        height, dx, dy = bilinear(fields, near).T
         step = cell * ((at - near) * np.column_stack([dx, dy])).sum(1)
         height = height + np.clip(step, -cell, cell)
         normals = side * np.column_stack([-dx, -dy, np.ones(len(xy))])
@@ -279,8 +318,20 @@ def _inner(body: ReliefBody, density: float, rng: np.random.Generator) -> list[S
         no = np.zeros(len(xy), bool)
         j, i = np.clip(np.rint(at).astype(int), 0, np.array(field.shape[::-1]) - 1).T
         source = xy if beside is None else outline.photo_xy(beside[i, j].astype(np.float64))
-        sheets.append(SurfacePoints(xy, height, normals, ~no, no, no, source))
+        surface = SurfacePoints(xy, height, normals, ~no, no, no, source)
+        sheets.append((surface, sum(map(len, chains))))
     return sheets
+
+
+def _end(line: RimLine, fields: F64, outline: ReliefSilhouette, spacing: float) -> F64:
+    """Photo px (N, 2) along the end of a hidden sheet: its heights and slopes (h, w, 3)."""
+    _, dx, dy = bilinear(fields, line.xy).T
+    flat = 1 / np.sqrt(1 + dx**2 + dy**2)
+    xy = outline.photo_xy(line.xy) + (INSET * spacing * flat)[:, None] * line.inward
+    height = bilinear(fields, outline.grid_xy(xy))[:, 0]
+    closed = np.column_stack([xy, height])
+    steps = np.linalg.norm(np.roll(closed, -1, axis=0) - closed, axis=1)
+    return _along(np.r_[0.0, np.cumsum(steps)], IN_LINE * spacing, xy)
 
 
 def _brim(

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
-from ...base.arrays import F64, Mask
+from ...base.arrays import F32, F64, Mask, Pixels
 from ...base.camera import Camera
+from ...pictures.image import to_u8
 from ..relief.shape_look import SeenShape
 from .evidence import OUTLINE_ERROR, STRIDE, Evidence
 
@@ -24,6 +26,14 @@ LEAST_FURTHER = 0.1  # x the outline, that lies on a further one
 HELD = 0.97  # x an ellipse's area, that is within the mask
 SEEN_LEAN = 0.35  # x a rim's own slope, that the network sees of it
 LEVEL = 0.25  # slope, below which a rim may as well face the camera
+SIZE = 100  # px, a lip's radius in the picture in which it is looked for
+# How far off it may be, x its radius, how much wider and how much more tilted.
+FREE = 0.3, 0.3, 0.25, 0.12, 0.12
+USUAL = 0.05  # x an edge all around: what it has to gain from each of them
+EDGES = 0.08, 0.05, 0.03, 0.02, 0.012  # x its radius, how wide an edge is; finer each time
+AROUND = 60  # places of a lip that are looked at
+TRIED, FINER = 5, 0.6  # values of each number, and how much nearer they lie the next time
+EDGE = 20.0  # levels per px, of an edge that counts by half
 HEIGHTS, RADII = (0.05, 1.6), (0.2, 1.05)  # x the first radius, of a further circle
 STEPS, ROUNDS = 25, 4  # of each, and how often they are made finer
 NEAREST = 0.1  # x the first circle's depth, that a further one is from the camera at least
@@ -205,3 +215,62 @@ def _further(first: Rim, rest: F64, error: float) -> Rim | None:
     )
     is_on = np.abs(rim.outside(rest)) < 2 * error
     return rim if is_on.sum() >= LEAST_FURTHER * PLACES else None
+
+
+def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) -> Rim:
+    """`lip` where the photo's edges are, of the object `mask` (H, W), and nearest to the axis.
+
+    Of a lip the outline shows an arc only, and a cup stands hardly ever amid its saucer.
+    """
+    size = lip.radius * camera.focal / lip.centre[2]
+    x, y = lip.centre[:2] / lip.centre[2] * camera.focal + [camera.cx, camera.cy]
+    scale = min(SIZE / size, 1.0)
+    reach = 2.0 * size
+    corner = np.array([x - reach, y - reach])
+    warp = scale * np.array([[1, 0, -corner[0]], [0, 1, -corner[1]]])
+    wide = (int(2 * reach * scale),) * 2
+    how = cv2.INTER_AREA if scale == 1 else cv2.INTER_LINEAR
+    smooth = cv2.GaussianBlur(to_u8(pixels), (0, 0), 0.5 / scale)
+    shown = cv2.warpAffine(smooth, warp, wide, flags=how, borderMode=cv2.BORDER_REPLICATE)
+    own = cv2.warpAffine(mask.astype(np.uint8), warp, wide)
+    outline = cv2.morphologyEx(own, cv2.MORPH_GRADIENT, np.ones((3, 3)))
+    edges = np.maximum(_edges(shown) * own, outline.astype(np.float32))
+    helper = np.cross(lip.normal, [0.0, 0.0, 1.0])
+    across = helper / np.linalg.norm(helper)
+    down = np.cross(lip.normal, across)
+    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    ring = np.stack([np.cos(turn), np.sin(turn)])
+    still = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+    best, spans = still, np.array(FREE)
+    for width in EDGES:
+        blurred = cv2.GaussianBlur(edges, (0, 0), width * SIZE)
+        steps = best[:, None] + spans[:, None] * np.linspace(-1, 1, TRIED)
+        trials = np.stack(np.meshgrid(*steps, indexing="ij"), -1).reshape(-1, 5)
+        x, y, wider, *tilt = trials.T
+        # A circle that tilts moves along the normal.
+        places = np.stack([x[:, None] + wider[:, None] * ring[0],
+                           y[:, None] + wider[:, None] * ring[1],
+                           wider[:, None] * -(np.stack(tilt, 1) @ ring)], -1)  # fmt: skip
+        places = lip.centre + lip.radius * (places @ np.stack([across, down, lip.normal]))
+        at = places[..., :2] / places[..., 2:] * camera.focal + [camera.cx, camera.cy]
+        at = np.rint((at - corner) * scale).astype(int).clip(0, wide[0] - 1)
+        seen = blurred[at[..., 1], at[..., 0]].mean(1)
+        likely = seen - USUAL * (((trials - still) / FREE) ** 2).sum(1)
+        best = trials[int(np.argmax(likely))]
+        spans = FINER * spans
+    centre = lip.centre + lip.radius * (best[0] * across + best[1] * down)
+    normal = lip.normal + best[3] * across + best[4] * down
+    normal /= np.linalg.norm(normal)
+    # So it looks from wherever it is along its rays: nearest to the first one's axis.
+    off, own = first.centre, centre
+    off, own = (part - part @ first.normal * first.normal for part in (off, own))
+    away = float(off @ own / max(own @ own, 1e-12))
+    return Rim(away * centre, normal, away * lip.radius * float(best[2]))
+
+
+def _edges(picture: np.ndarray) -> F32:
+    """(h, w) in [0, 1] how much colours (h, w, 3) u8 change there."""
+    levels = picture.astype(np.float32)
+    x, y = (cv2.Sobel(levels, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1)))
+    strong = np.sqrt((x * x + y * y).sum(-1))
+    return np.asarray(strong / (strong + EDGE), np.float32)

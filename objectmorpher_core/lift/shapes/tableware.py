@@ -24,7 +24,7 @@ from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
 from .drawing import Mesh, RayGrid, drawn
 from .evidence import Evidence
-from .rims import Rim
+from .rims import Rim, at_edge
 from .solids import AROUND, FINE, revolved
 
 CLOSED = 3.0  # cells from the outline, within which nothing lies behind what stands
@@ -37,7 +37,7 @@ PULL = 100.0  # x a step's weight, that a place on a rim has
 SOLVING = 300, 1e-4  # rounds of conjugate gradients, and when the residual is small enough
 DISH = 0.07, 0.05  # x its radius: how deep a dish is, and how thick
 FEET, BULGES = (0.35, 0.5, 0.65, 0.8, 0.95), (1.0, 0.5, 0.25)  # x the lip's radius; exponents
-BAND = 0.12  # x the lip's radius, within which a vessel ends at the photo's edge
+BAND = 0.06  # x the lip's radius, within which a vessel ends at the photo's edge
 AROUND_SHARE = 0.15  # x its radius: how much a way around an axis counts beside one along it
 RINGS, USUAL = 16, 60  # rings in a rim's radius, and percent of each that look alike
 CLEAR = 9  # cells from where a part ends, nearer to which colours are mixed
@@ -51,7 +51,10 @@ def laid(
 
     How far away the whole is, the body decides.
     """
-    stack = Stack.of(body, rims, seen, subject) if len(rims) > 1 else None
+    stack = None
+    if len(rims) > 1:
+        rims = [rims[0], at_edge(rims[0], rims[1], subject.pixels, subject.mask, subject.camera)]
+        stack = Stack.of(body, rims, seen, subject)
     if stack is not None:
         return _stacked(body, rims, stack, subject, thickness)
     camera = subject.camera
@@ -150,9 +153,15 @@ class Stack(NamedTuple):
         near = np.where(stands, vessel_near, dish_near)
         near += _hollow(rims[1], tangents, before, outline)
         far = np.maximum(np.where(lies, dish_far, vessel_far), near)
-        nearest = nearest_in(stands | lies)  # what sticks out, and what is around, goes on
+        known = stands | lies
+        nearest = nearest_in(known)  # what sticks out, and what is around, goes on
         near, far = near.ravel()[nearest], far.ravel()[nearest]
         stands = outline.inside & stands.ravel()[nearest]
+        plane = np.log(rims[0].depth(tangents))
+        beyond = _touching(outline.inside & ~known, lies & ~stands)  # a spoon beside the lip
+        nearest = nearest_in(outline.inside)
+        near, far = (np.where(beyond, plane, part).ravel()[nearest] for part in (near, far))
+        stands, lies = stands & ~beyond, lies | beyond
         # It closes at its limb: no wall stands there.
         beside = cv2.dilate((outline.inside & ~stands).astype(np.uint8), np.ones((5, 5))) > 0
         vessel_far = np.where(stands & beside, near, np.maximum(vessel_far, near))
@@ -164,16 +173,21 @@ class Stack(NamedTuple):
         camera = subject.camera
         tangents = (outline.photo_xy(outline.cells) - [camera.cx, camera.cy]) / camera.focal
         away = float(np.median((self.dish_near - np.log(rims[0].depth(tangents)))[self.lies]))
-        seen, back, dish = (
-            Around.of(rims[0], tangents, depth - away)
-            for depth in (self.near, self.vessel_far, self.dish_near)
-        )
+        stem, _ = _stem(rims)
+        wall_seen, back, seen, dish = (
+            Around.of(rim, tangents, depth - away)
+            for rim, depth in (
+                (stem, self.near), (stem, self.vessel_far),
+                (rims[0], self.near), (rims[0], self.dish_near),
+            )
+        )  # fmt: skip
         photo, hidden = _photo(outline, subject.pixels), self.stands & self.lies
+        is_wall = self.stands & (rims[1].outside(tangents) > 0)
         clear = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * CLEAR + 1,) * 2)
         wall, plain = (
             _usual(cv2.erode(own.astype(np.uint8), clear) > 0, level, photo)
             for own, level in (
-                (self.stands & (rims[1].outside(tangents) > 0), seen.height),
+                (is_wall, wall_seen.height),
                 (self.lies & ~self.stands, seen.radius),
             )
         )
@@ -183,8 +197,14 @@ class Stack(NamedTuple):
         )
         return Behind(
             own_back, front,
-            seen.nearest(back, wall, hidden, "height"),
+            wall_seen.nearest(back, wall, hidden, "height"),
             seen.nearest(dish, plain, hidden, "radius"),
+            self.stands,
+            np.where(
+                is_wall[..., None],
+                wall_seen.nearest(wall_seen, wall, is_wall, "height"),
+                seen.nearest(seen, plain, self.lies & ~self.stands, "radius"),
+            ),
         )  # fmt: skip
 
 
@@ -204,6 +224,13 @@ def _stacked(
         body, middle=front - half, front=sides[0], back=sides[1], cuts=cuts, kind="round",
         behind=stack.behind(rims, outline, subject),
     )  # fmt: skip
+
+
+def _touching(where: Mask, other: Mask) -> Mask:
+    """(h, w) the pieces of `where` (h, w) that lie beside `other` (h, w)."""
+    _, pieces = cv2.connectedComponents(where.astype(np.uint8))
+    beside = cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return where & np.isin(pieces, np.unique(np.asarray(pieces)[where & beside]))
 
 
 def _log_depth(inverse: F64) -> F64:
@@ -264,7 +291,8 @@ class Around(NamedTuple):
 
         As high, or as far from the axis, and about as far around it.
         """
-        found = np.zeros((*source.shape, 2), np.int64)
+        rows, columns = np.indices(source.shape)
+        found = np.stack([columns, rows], -1)
         if source.any() and wanted.any():
             tree = KDTree(self._places(level)[source])
             _, index = tree.query(other._places(level)[wanted])
@@ -303,17 +331,27 @@ def _turned(rim: Rim, heights: F64, radii: F64, around: int) -> Mesh:
     return revolved(places, rim.radius * radii, rim.normal, around)
 
 
+def _stem(rims: list[Rim]) -> tuple[Rim, float]:
+    """Where the axis of what stands meets the plane of the dish, and how high its lip is.
+
+    Both are x the dish's radius.
+    """
+    first, lip = rims
+    rise = float((lip.centre - first.centre) @ first.normal) / float(lip.normal @ first.normal)
+    return Rim(lip.centre - rise * lip.normal, lip.normal, first.radius), rise / first.radius
+
+
 def _vessel(rims: list[Rim], evidence: Evidence) -> Mesh:
     """What stands in a dish, from its foot to its lip, as the network's normals say."""
     first, lip = rims
-    high = float((lip.centre - first.centre) @ lip.normal) / first.radius
+    stem, high = _stem(rims)
     wide, foot = lip.radius / first.radius, -DISH[0]
     rise = np.linspace(0, 1, 12)
     heights = np.r_[foot + (high - foot) * rise, high]
 
     def built(narrow: float, bulge: float, around: int) -> Mesh:
         radii = wide * np.r_[narrow + (1 - narrow) * rise**bulge, 0.001]
-        return _turned(first, np.r_[foot, heights], np.r_[0.001, radii], around)
+        return _turned(stem, np.r_[foot, heights], np.r_[0.001, radii], around)
 
     saucer = _dish(first, AROUND)
     trials = [(f, b) for f in FEET for b in BULGES]

@@ -12,6 +12,7 @@ from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.shapes import laid, rims_of
 from objectmorpher_core.lift.shapes.drawing import Mesh, RayGrid, drawn
+from objectmorpher_core.lift.shapes.rims import Rim, at_edge
 from objectmorpher_core.lift.shapes.solids import ellipsoid, revolved
 from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_research.training.shape_eval import score, surfaces_of
@@ -103,6 +104,27 @@ def test_a_cup_stands_on_a_saucer_that_goes_on_behind_it() -> None:
     assert (off - np.median(off)).std() < 0.02
     rows, columns = found.behind.beside[hidden][:, ::-1].T
     assert not hidden[rows, columns].any(), "its colours are from where it is seen"
+
+
+def test_a_lip_is_where_the_photo_has_its_edge_also_off_the_saucers_middle() -> None:
+    across = np.cross(UP, [0.0, 0.0, 1.0])
+    aside = 0.02 * across / np.linalg.norm(across)
+    seen, _ = see(_both())
+    _, camera = body_of(seen)
+    first, true = Rim(AT, UP, 0.34), Rim(AT + 0.24 * UP + aside, UP, 0.15)
+    lip = Rim(AT + 0.24 * UP, UP, 0.14)  # as about the saucer's axis
+    rows, columns = np.indices(seen.mask.shape) + 0.5
+    tangents = np.stack([columns - camera.cx, rows - camera.cy], -1) / camera.focal
+    grey = np.where(true.outside(tangents) < 0, 230, np.where(seen.mask, 120, 40))
+    pixels = grey.astype(np.uint8)[..., None].repeat(3, 2)
+    on_lip = tangents[np.abs(true.outside(tangents) * true.centre[2]) < 0.005 * true.radius]
+
+    def off(rim: Rim) -> float:
+        return float(np.abs(rim.outside(on_lip)).max() * rim.centre[2] / rim.radius)
+
+    found = at_edge(first, lip, pixels, seen.mask, camera)
+    assert off(found) < min(0.08, 0.4 * off(lip))
+    assert found.normal @ UP > np.cos(np.radians(6.0))
 
 
 def test_an_egg_has_no_rim() -> None:
