@@ -40,6 +40,7 @@ ROOT = Path(__file__).parents[2]
 MEMORY = 3 << 30  # bytes of address space beyond what the first runs took
 SECONDS = 100  # of processor time for a run
 TURN = 400  # runs of one process
+MOST_WAIT = 1e6  # s, which a system call takes
 NOW = "now"  # the command line that is being run
 FIRST = (  # what is imported and compiled late comes before the limits
     ["edit", "p/plain.png", "-o", "o.png", "--mask", "p/plain-mask.png", "--move", "5,5",
@@ -176,7 +177,7 @@ def _one_process(
             command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=noise, text=True
         )
         try:
-            told, _ = process.communicate(timeout=seconds + 60)
+            told, _ = process.communicate(timeout=min(seconds + 60, MOST_WAIT))
         except subprocess.TimeoutExpired:  # there is no more time: what was run counts
             process.kill()
             told, _ = process.communicate()

@@ -167,7 +167,9 @@ def _dragged(name: str, lifted: LiftedObject, texture: TextureLevels, camera: Ca
     def solve(target: F64) -> None:
         nonlocal pose
         handles = (Handle(int(down[0]), top, target), *pins)
-        pose = puppet.deformer.solve(handles, start=pose, **DRAG).pose
+        pose = puppet.deformer.solve(
+            handles, start=pose, seconds=DRAG["seconds"], tolerance=DRAG["tolerance"]
+        ).pose
 
     solve(top)  # the handles are new: prepared once
     for frame in range(FRAMES):
