@@ -42,6 +42,7 @@ from objectmorpher_core.base.limits import CONNECTIONS
 from objectmorpher_core.base.progress import Cancelled, Progress, part
 from objectmorpher_core.base.rotations import matrices_from_quats
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Click, Document, Pose, Prompt
 from objectmorpher_core.document.placement import placement_of
 from objectmorpher_core.pictures.image import (
@@ -77,10 +78,6 @@ POLICY = (
     " script-src 'self' 'unsafe-inline' blob:; worker-src blob:; frame-src blob:; base-uri 'none';"
     " form-action 'none'; frame-ancestors 'none'"
 )
-
-
-class EditError(ValueError):
-    """A question that makes no sense at this point of an edit; one sentence."""
 
 
 @dataclass(eq=False)
