@@ -218,6 +218,12 @@ monkey: .make/test
 	@$(COMPILE)
 	PYTHONPATH=. $(PYTHON) tests/app/monkey.py --events $(or $(EVENTS),20000) $(ARGS)
 
+# Plays random sessions of an artist: nothing moves that was not touched. SESSIONS says how many.
+.PHONY: sessions
+sessions: .make/test
+	@$(COMPILE)
+	SESSIONS=$(or $(SESSIONS),2000) $(PYTHON) -m pytest -q -n 0 tests/app/test_random_sessions.py
+
 # Lets every system call go wrong with which something is written; ARGS=--power cuts the power.
 .PHONY: faults
 faults: .make/test
