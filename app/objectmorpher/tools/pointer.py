@@ -74,8 +74,14 @@ class Previewing(Protocol):
     """What a stroke shows while it lasts: the editor's state."""
 
     view: ViewState
-    preview: Document | None
     rubber: tuple[float, float, float, float] | None  # box being drawn, canvas px
+
+    @property
+    def preview(self) -> Document | None:
+        """The document of the stroke."""
+
+    @preview.setter
+    def preview(self, preview: Document | None) -> None: ...
 
 
 class Hand:
