@@ -78,7 +78,7 @@ def test_a_command_is_found_and_run_by_typing(
         hands.xdotool("type", "--delay", 30, "panel")
         hands.area("Panel")
         hands.press("Return")
-        hands.wait(lambda: "Another object" not in hands.places(), "folding the panel up")
+        hands.wait(lambda: "Select subject" not in hands.places(), "folding the panel up")
         hands.press("ctrl+k")
         hands.area(SEARCH)
         hands.settle()

@@ -80,7 +80,7 @@ def test_the_whole_job_by_keyboard_alone(hands: Hands, photo_path: Path, tmp_pat
     keys.press("Return")
     keys.reach("Harmonise")
     keys.press("Return")
-    keys.wait("Place")  # what harmonising can be set to
+    keys.reach("Place")  # what harmonising can be set to
 
     keys.press("F10")
     keys.reach("Menu: File", by="Left")
