@@ -31,7 +31,7 @@ out vec4 color;
 
 #ifdef MODE  // how it is mixed with what is there
 uniform sampler2D under;
-#include "modes.glsl"
+#include "blend_modes.glsl"
 #endif
 
 #ifdef HAS_GRAIN

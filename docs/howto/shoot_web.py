@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from objectmorpher.server.address import make_token  # noqa: E402
-from objectmorpher.server.web import WebServer  # noqa: E402
+from objectmorpher.server.web_editor import WebServer  # noqa: E402
 from tests.browser import opened_browser  # noqa: E402
 
 PICTURE = Path(__file__).with_name("web.jpg")

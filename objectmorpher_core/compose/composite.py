@@ -37,11 +37,11 @@ from .blend import (
     with_touched,
 )
 from .blend import STILL as STILL
+from .blend_modes import mixed, over
 from .light.defocus import DETAIL, blurred, reach_of, sharpened
 from .light.harmonize import lit, saturated
 from .light.lighting import NOTHING, Lighting, Lit
 from .light.lighting import object_texture as object_texture
-from .modes import mixed, over
 from .order import holes, leaves_a_hole, stack
 from .plate.plate import hole_margin, plate_crop, plate_of_holes
 from .shadow.shadow import Shade

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from .model import Document, EditObject
 
 OF_A_ROW = ("name", "is_visible", "is_locked", "layer")  # what also a locked object may change in
+KEPT = tuple(f.name for f in fields(EditObject) if f.name not in OF_A_ROW)
 
 
 def set_locked(document: Document, k: int, is_locked: bool) -> Document:
@@ -19,15 +20,10 @@ def locked_change(before: Document, after: Document) -> EditObject | None:
 
     Its name, whether it is shown, and which others it covers are not kept from change.
     """
-    free = {name: None for name in OF_A_ROW}
-
-    def is_kept(own: EditObject) -> bool:
-        kept = vars(own) | free
-        return any(
-            other is own or all(value is now[name] for name, value in kept.items())
-            for other in after.objects
-            if (now := vars(other) | free)
-        )
-
     locked = (own for own in before.objects if own.is_locked)
-    return next((own for own in locked if not is_kept(own)), None)
+    return next((own for own in locked if not any(_is_same(own, o) for o in after.objects)), None)
+
+
+def _is_same(one: EditObject, other: EditObject) -> bool:
+    """Whether they differ at most in what also a locked object may change in."""
+    return one is other or all(getattr(one, name) is getattr(other, name) for name in KEPT)

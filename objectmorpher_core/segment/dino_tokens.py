@@ -13,7 +13,7 @@ import numpy as np
 from .. import models
 from ..base.arrays import F32, RGB
 from ..base.progress import Progress, silent
-from ..models.ahead import Ahead
+from ..models.early_answers import EarlyAnswers
 from ..models.onnx_session import open_session, run_session
 from .salience import DEVIATION, MEAN
 
@@ -63,13 +63,13 @@ def photo_tokens(rgb: RGB, patches: int, progress: Progress = silent) -> F32:
     """(h, w, 384) of about so many patches of a photo (H, W, 3)."""
     small = _reduced(rgb, patches)
     watch = lambda: progress(0.5, "recognising its parts")  # noqa: E731
-    return _ahead.answer(small, lambda: shared().tokens(small, progress), watch)
+    return _early.answer(small, lambda: shared().tokens(small, progress), watch)
 
 
 def expect_tokens(rgb: RGB) -> Callable[[], None]:
     """Who asks for the tokens of a whole photo waits for what is returned, which computes them."""
     small = _reduced(rgb, PATCHES)
-    return _ahead.expect(small, lambda: shared().tokens(small))
+    return _early.expect(small, lambda: shared().tokens(small))
 
 
 def _reduced(rgb: RGB, patches: int) -> RGB:
@@ -81,7 +81,7 @@ def _reduced(rgb: RGB, patches: int) -> RGB:
     return np.asarray(cv2.resize(rgb, (w * PATCH, h * PATCH), interpolation=how), np.uint8)
 
 
-_ahead: Ahead[F32] = Ahead()
+_early: EarlyAnswers[F32] = EarlyAnswers()
 _opening = Lock()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import models
 from ..base.arrays import F32, RGB
-from ..models.ahead import Ahead
+from ..models.early_answers import EarlyAnswers
 from ..models.onnx_session import open_session
 
 WEIGHT = "u2netp"
@@ -36,16 +36,16 @@ class SubjectNet:
     def salience(self, rgb: RGB) -> F32:
         """(320, 320) in [0, 1] for a photo (H, W, 3)."""
         small = _reduced(rgb)
-        return _ahead.answer(small, lambda: _seen(small), lambda: None)
+        return _early.answer(small, lambda: _seen(small), lambda: None)
 
 
 def expect_salience(rgb: RGB) -> Callable[[], None]:
     """Who asks for the salience of a photo waits for what is returned, which computes it."""
     small = _reduced(rgb)
-    return _ahead.expect(small, lambda: _seen(small))
+    return _early.expect(small, lambda: _seen(small))
 
 
-_ahead: Ahead[F32] = Ahead()
+_early: EarlyAnswers[F32] = EarlyAnswers()
 _opening = Lock()
 
 

@@ -30,7 +30,7 @@ from gimp_stub import make_gimp
 from hands import ROOT, opened
 from objectmorpher.__main__ import main
 from objectmorpher.cli.plugin import HOSTS, plugin_files
-from objectmorpher.server.web import WebServer
+from objectmorpher.server.web_editor import WebServer
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document.model import Document, Placement

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hands import ROOT
 from objectmorpher.__main__ import main
-from objectmorpher.server.page import joined
+from objectmorpher.server.share_page import joined
 from objectmorpher_core.session.file import save_session
 from tests import shapes
 from tests.browser import Browser, opened_browser

@@ -82,7 +82,7 @@ def test_the_whole_job_by_keyboard_alone(hands: Hands, photo_path: Path, tmp_pat
     keys.press("Return")
     keys.reach("Place")  # what harmonising can be set to
 
-    keys.press("F10")
+    keys.press("Escape", "F10")
     keys.reach("Menu: File", by="Left")
     keys.press("Escape", "Escape", "F6")
     hands.wait(lambda: keys.focus == "Tool: Select", "going to the next part of the window")

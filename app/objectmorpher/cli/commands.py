@@ -218,11 +218,12 @@ def run_replay(options: argparse.Namespace) -> None:
     from objectmorpher_core.session.file import encode_session, load_session
 
     wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
-    extras: dict[Path | None, tuple[str, ...]] = {
-        options.report: (".json",), options.save_handles: (".json",),
-        options.save_mesh: OUTPUTS["mesh"], options.save_session: (".omorph",),
-    }  # fmt: skip
-    wanted |= {path: endings for path, endings in extras.items() if path is not None}
+    for path, endings in (
+        (options.report, (".json",)), (options.save_handles, (".json",)),
+        (options.save_mesh, OUTPUTS["mesh"]), (options.save_session, (".omorph",)),
+    ):  # fmt: skip
+        if path:
+            wanted[path] = endings
     video, clip = options.save_video, Clip(options.video, options.seconds)
     if video and _is_folder("save_video", video):
         _check_folder(video)

@@ -94,7 +94,7 @@ OF_CLUSTERS = ("ray", "stages", "gpus", "store")
 
 def _run_web(options: argparse.Namespace) -> None:
     """Serves the editor to browsers until it is interrupted or ended."""
-    from ..server.web import WebServer
+    from ..server.web_editor import WebServer
     from ..system.logs import show_log
 
     meant = [name for name in OF_CLUSTERS if getattr(options, name) is not None]

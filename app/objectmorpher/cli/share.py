@@ -14,7 +14,7 @@ def run_share(options: argparse.Namespace) -> None:
     """`objectmorpher share`"""
     from objectmorpher_core.session.file import load_session
 
-    from ..server.page import encode_page
+    from ..server.share_page import encode_page
     from .commands import check_outputs
 
     check_outputs([options.session], {options.out: (".html",)})

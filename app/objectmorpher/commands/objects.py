@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from objectmorpher_core.document.model import Placement
+
 from ..editor.editor import Editor
 from ..editor.tasks import SELECT
 from ..system.texts import t
@@ -69,33 +73,28 @@ COMMANDS: dict[str, Command] = {
 }
 
 
-def _not_moved(editor: Editor) -> str | None:
-    placement = editor.placing.placement
-    if placement is None:
-        return no_lift(editor)
-    return t("The object is where it was in the photo") if placement.is_identity else None
+def _where_it_was() -> str:
+    return t("The object is where it was in the photo")
 
 
-def _not_shifted(editor: Editor) -> str | None:
-    placement = editor.placing.placement
-    if placement is None:
-        return no_lift(editor)
-    is_there = placement.move == (0.0, 0.0) and placement.depth == 0
-    return t("The object is where it was in the photo") if is_there else None
+def _unless(
+    is_reset: Callable[[Placement], bool], reason: Callable[[], str]
+) -> Callable[[Editor], str | None]:
+    """The reason why what is reset already cannot be reset."""
+
+    def why_not(editor: Editor) -> str | None:
+        placement = editor.placing.placement
+        if placement is None:
+            return no_lift(editor)
+        return reason() if is_reset(placement) else None
+
+    return why_not
 
 
-def _not_turned(editor: Editor) -> str | None:
-    placement = editor.placing.placement
-    if placement is None:
-        return no_lift(editor)
-    return None if any(placement.turn) else t("The object is not turned")
-
-
-def _not_sized(editor: Editor) -> str | None:
-    placement = editor.placing.placement
-    if placement is None:
-        return no_lift(editor)
-    return t("The object has its own size") if placement.scale == 1 else None
+_not_moved = _unless(lambda place: place.is_identity, _where_it_was)
+_not_shifted = _unless(lambda place: place.move == (0.0, 0.0) and place.depth == 0, _where_it_was)
+_not_turned = _unless(lambda place: not any(place.turn), lambda: t("The object is not turned"))
+_not_sized = _unless(lambda place: place.scale == 1, lambda: t("The object has its own size"))
 
 
 PLACE_COMMANDS: dict[str, Command] = {

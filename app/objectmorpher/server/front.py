@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from objectmorpher_core.base.limits import CONNECTIONS
 from objectmorpher_core.base.limits import CONNECTIONS as MOST_CONNECTIONS
@@ -41,12 +41,13 @@ from .table import Table, types
 # An HTTP server for a few known users: one request per connection, a thread for each.
 #
 # It bounds how many connections there are, how long they may be silent and how much they may send.
-# `server/front.py` and `study/server.py` say who may ask, for what, and what is answered.
+# `Front`, `web_editor.py` and `study/server.py` say who may ask, for what, and what is answered.
 
 IDLE = 30.0  # s that a connection may say nothing
 PIECE = 1 << 20  # bytes read at a time
 MOST_DIGITS = 18  # of a length that is announced
 POLL = 0.1  # s until `close` is noticed
+NOTHING = "there is nothing of that name"
 
 
 class HttpServer:
@@ -130,7 +131,7 @@ class Refusal(Exception):
 
 
 class Handler(BaseHTTPRequestHandler):
-    """The handler of one request. Subclasses have do_GET and so on, which call `answer`."""
+    """The handler of one request. Subclasses have `admit`, and `get` or `post` or both."""
 
     timeout = IDLE
     protocol_version = "HTTP/1.1"
@@ -141,9 +142,30 @@ class Handler(BaseHTTPRequestHandler):
     def log_message(self, format: str, *args: Any) -> None:
         log.debug(format, *args)
 
+    def do_GET(self) -> None:
+        self.answer(self.get)
+
+    def do_POST(self) -> None:
+        self.answer(self.post)
+
     def admit(self) -> None:
         """Raises Refusal, before anything of the body is read, for whom nothing is done."""
         raise NotImplementedError
+
+    def get(self) -> None:
+        """Send the answer to a GET. Raises Refusal."""
+        raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
+
+    def post(self) -> None:
+        """Send the answer to a POST. Raises Refusal."""
+        raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
+
+    def admit_with(self, token: str) -> None:
+        """Raises Refusal for whoever does not bring the token along."""
+        scheme, _, brought = self.headers.get("Authorization", "").partition(" ")
+        # Latin-1 is how http.server reads headers; what is not ASCII cannot be a token.
+        if scheme != "Bearer" or not is_same(brought.strip(), token):
+            raise Refusal(HTTPStatus.UNAUTHORIZED, "the token is missing or wrong")
 
     def answer(self, work: Callable[[], None]) -> None:
         """Does `work`, which sends the answer or raises Refusal, for whoever is admitted."""
@@ -218,7 +240,7 @@ class Front(HttpServer):
         self.token, self.runner, self.table, self.limits = (
             check_token(token), runner, table, limits,
         )  # fmt: skip
-        self.blobs = Blobs(limits.blobs)
+        self.blobs: Kept[bytes] = Kept(limits.blobs, len)  # by their SHA-256
         self.places = threading.BoundedSemaphore(limits.jobs)
         super().__init__(address, partial(_Handler, self), limits.connections)
 
@@ -230,25 +252,16 @@ class _Handler(Handler):
         self.front = front
         super().__init__(*connection)
 
-    def do_GET(self) -> None:
-        self.answer(self._get)
-
     def do_PUT(self) -> None:
         self.answer(self._put)
 
-    def do_POST(self) -> None:
-        self.answer(self._post)
-
     def admit(self) -> None:
         """Refuses whoever has not the token."""
-        scheme, _, token = self.headers.get("Authorization", "").partition(" ")
-        # Latin-1 is how http.server reads headers; what is not ASCII cannot be a token.
-        if scheme != "Bearer" or not is_same(token.strip(), self.front.token):
-            raise Refusal(HTTPStatus.UNAUTHORIZED, "the token is missing or wrong")
+        self.admit_with(self.front.token)
 
-    def _get(self) -> None:
+    def get(self) -> None:
         if self.path != "/v1/hello":
-            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+            raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
         self.send_json(HTTPStatus.OK, {
             "product": "objectmorpher", "version": __version__, "protocol": PROTOCOL,
             "stages": self.front.runner.stages(), "functions": sorted(self.front.table),
@@ -258,14 +271,14 @@ class _Handler(Handler):
     def _put(self) -> None:
         _, folder, name = ("", *self.path.removeprefix("/v1/").split("/"), "")[:3]
         if folder != "blobs" or len(name) != 64:
-            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+            raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
         body = self.read_body(self.front.limits.body)
         if digest(body) != name:
             raise Refusal(HTTPStatus.BAD_REQUEST, "the bytes are not those of that name")
         self.front.blobs.add(name, body)
         self.send_json(HTTPStatus.CREATED, {})
 
-    def _post(self) -> None:
+    def post(self) -> None:
         name = self.path.removeprefix("/v1/jobs/")
         served = self.front.table.get(name)
         if served is None:
@@ -366,30 +379,30 @@ class _Conversation:
         self._said.put((fraction, note))
 
 
-# Large arrays that were sent to a server, by their SHA-256; the least recently used go first.
+Thing = TypeVar("Thing")
 
 
-class Blobs:
-    """A bounded memory, for many threads."""
+class Kept(Generic[Thing]):
+    """A bounded memory by name, for many threads; the least recently used goes first."""
 
-    def __init__(self, most: int) -> None:
-        """`most`: bytes in all."""
-        self._most = most
-        self._kept: OrderedDict[str, bytes] = OrderedDict()
+    def __init__(self, most: int, size_of: Callable[[Thing], int]) -> None:
+        """`most`: in all, of what `size_of` counts."""
+        self._most, self._size_of = most, size_of
+        self._kept: OrderedDict[str, Thing] = OrderedDict()
         self._size = 0
         self._lock = threading.Lock()
 
-    def add(self, name: str, body: bytes) -> None:
-        """Keeps `body`; what was not used for longest is dropped where it does not fit."""
+    def add(self, name: str, thing: Thing) -> None:
+        """Keeps it; what was not used for longest is dropped where it does not fit."""
         with self._lock:
             if name not in self._kept:
-                self._size += len(body)
-            self._kept[name] = body
+                self._size += self._size_of(thing)
+            self._kept[name] = thing
             self._kept.move_to_end(name)
             while self._size > self._most and len(self._kept) > 1:
-                self._size -= len(self._kept.popitem(last=False)[1])
+                self._size -= self._size_of(self._kept.popitem(last=False)[1])
 
-    def found(self, names: Iterable[str]) -> dict[str, bytes]:
+    def found(self, names: Iterable[str]) -> dict[str, Thing]:
         """Return those of `names` that are stored here."""
         with self._lock:
             here = [name for name in names if name in self._kept]
@@ -399,5 +412,5 @@ class Blobs:
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Return how much of `most` is taken."""
         return self._size

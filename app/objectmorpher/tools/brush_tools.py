@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
+
+from objectmorpher_core.base.arrays import F64
 
 from ..editor.view import Composed, Painted
 from ..system.texts import t
@@ -22,7 +24,7 @@ class MaskTool:
             return _find_edge(editor) if is_painting else ignore()
         if editor.view.selecting.painted is not Painted.SELECTION:
             is_painting = editor.shaping.start_stroke(is_erasing)
-            return _shape(editor, pointer) if is_painting else ignore()
+            return _paint(editor.shaping, pointer) if is_painting else ignore()
         return self._select(editor, pointer, is_erasing)
 
     def _select(self, editor: Editor, pointer: Pointer, is_erasing: bool) -> Stroke:
@@ -63,15 +65,24 @@ def _find_edge(editor: Editor) -> Stroke:
         editor.edging.drop_stroke()
 
 
-def _shape(editor: Editor, pointer: Pointer) -> Stroke:
-    """A stroke that tells about the shape."""
+class _Painted(Protocol):
+    """What a brush paints on, after a stroke has begun there."""
+
+    def paint(self, xy: F64) -> None: ...
+
+    def end_stroke(self) -> None: ...
+
+    def drop_stroke(self) -> None: ...
+
+
+def _paint(painted: _Painted, pointer: Pointer) -> Stroke:
     try:
-        editor.shaping.paint(pointer.xy)
+        painted.paint(pointer.xy)
         while (pointer := (yield)).is_down:
-            editor.shaping.paint(pointer.xy)
-        editor.shaping.end_stroke()
+            painted.paint(pointer.xy)
+        painted.end_stroke()
     finally:  # Esc closes the stroke where it waits
-        editor.shaping.drop_stroke()
+        painted.drop_stroke()
 
 
 def erases(editor: Editor, pointer: Pointer) -> bool:
@@ -98,7 +109,7 @@ class ComposeTool:
             return self._take(editor) if editor.hinting.start(pointer.xy) else ignore()
         if not editor.composing.start_stroke(is_other):
             return ignore()
-        return self._paint(editor, pointer)
+        return _paint(editor.composing, pointer)
 
     def _take(self, editor: Editor) -> Stroke:
         try:
@@ -107,15 +118,6 @@ class ComposeTool:
             editor.hinting.finish()
         finally:
             editor.hinting.drop()
-
-    def _paint(self, editor: Editor, pointer: Pointer) -> Stroke:
-        try:
-            editor.composing.paint(pointer.xy)
-            while (pointer := (yield)).is_down:
-                editor.composing.paint(pointer.xy)
-            editor.composing.end_stroke()
-        finally:  # Esc closes the stroke where it waits
-            editor.composing.drop_stroke()
 
     def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         is_painting = editor.view.compose.is_bare and editor.is_on_photo(pointer.xy)

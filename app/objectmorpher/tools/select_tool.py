@@ -46,8 +46,10 @@ class SelectTool:
         other = editor.landing.moved_at(pointer.xy)
         if other is not None and other != editor.current:
             assert editor.document is not None
-            is_locked = editor.document.objects[other].is_locked
-            (editor.say_locked if is_locked else editor.objects.take_up)(other)
+            if editor.document.objects[other].is_locked:
+                editor.say_locked(other)
+            else:
+                editor.objects.take_up(other)
             return
         x, y = editor.landing.in_photo(pointer.xy)
         editor.selection.add_click(float(x), float(y), is_foreground)

@@ -24,7 +24,7 @@ from .silhouette import ReliefSilhouette
 
 SHORTEST = 4  # cells of a rim that is looked at
 STAIRS, CORNERS = 4.0, 1.5  # cells, over which an outline's staircase is evened, and at corners
-STAIR = 0.4  # cells: what evening moves by more is no stair
+STAIR = 0.25  # cells: what evening moves by more is no stair
 
 
 @dataclass(frozen=True, eq=False)

@@ -222,21 +222,11 @@ def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) ->
 
     Of a lip the outline shows an arc only, and a cup stands hardly ever amid its saucer.
     """
-    size = lip.radius * camera.focal / lip.centre[2]
-    x, y = lip.centre[:2] / lip.centre[2] * camera.focal + [camera.cx, camera.cy]
-    scale = min(SIZE / size, 1.0)
-    reach = 2.0 * size
-    corner = np.array([x - reach, y - reach])
-    warp = scale * np.array([[1, 0, -corner[0]], [0, 1, -corner[1]]])
-    wide = (int(2 * reach * scale),) * 2
-    how = cv2.INTER_AREA if scale == 1 else cv2.INTER_LINEAR
-    smooth = cv2.GaussianBlur(to_u8(pixels), (0, 0), 0.5 / scale)
-    shown = cv2.warpAffine(smooth, warp, wide, flags=how, borderMode=cv2.BORDER_REPLICATE)
-    own = cv2.warpAffine(mask.astype(np.uint8), warp, wide)
-    outline = cv2.morphologyEx(own, cv2.MORPH_GRADIENT, np.ones((3, 3)))
-    edges = np.maximum(_edges(shown) * own, outline.astype(np.float32))
-    helper = np.cross(lip.normal, [0.0, 0.0, 1.0])
-    across = helper / np.linalg.norm(helper)
+    edges, corner, scale = _edges_around(lip, pixels, mask, camera)
+    most = np.array(edges.shape[::-1]) - 1
+    flat = np.cross(lip.normal, [0.0, 0.0, 1.0])
+    lean = float(np.linalg.norm(flat))
+    across = flat / lean if lean > 1e-9 else np.array([1.0, 0.0, 0.0])
     down = np.cross(lip.normal, across)
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(turn), np.sin(turn)])
@@ -246,14 +236,14 @@ def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) ->
         blurred = cv2.GaussianBlur(edges, (0, 0), width * SIZE)
         steps = best[:, None] + spans[:, None] * np.linspace(-1, 1, TRIED)
         trials = np.stack(np.meshgrid(*steps, indexing="ij"), -1).reshape(-1, 5)
-        x, y, wider, *tilt = trials.T
+        aside, below, wider, *tilt = trials.T
         # A circle that tilts moves along the normal.
-        places = np.stack([x[:, None] + wider[:, None] * ring[0],
-                           y[:, None] + wider[:, None] * ring[1],
+        places = np.stack([aside[:, None] + wider[:, None] * ring[0],
+                           below[:, None] + wider[:, None] * ring[1],
                            wider[:, None] * -(np.stack(tilt, 1) @ ring)], -1)  # fmt: skip
         places = lip.centre + lip.radius * (places @ np.stack([across, down, lip.normal]))
         at = places[..., :2] / places[..., 2:] * camera.focal + [camera.cx, camera.cy]
-        at = np.rint((at - corner) * scale).astype(int).clip(0, wide[0] - 1)
+        at = np.rint((at - corner) * scale).astype(int).clip(0, most)
         seen = blurred[at[..., 1], at[..., 0]].mean(1)
         likely = seen - USUAL * (((trials - still) / FREE) ** 2).sum(1)
         best = trials[int(np.argmax(likely))]
@@ -266,6 +256,30 @@ def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) ->
     off, own = (part - part @ first.normal * first.normal for part in (off, own))
     away = float(off @ own / max(own @ own, 1e-12))
     return Rim(away * centre, normal, away * lip.radius * float(best[2]))
+
+
+def _edges_around(lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) -> tuple[F32, F64, float]:
+    """Edges of the object in [0, 1] around a lip of at most SIZE px; where, and how large.
+
+    A px (2,) of the photo is at (px - corner (2,)) x scale of that picture.
+    """
+    size = lip.radius * camera.focal / lip.centre[2]
+    scale = min(SIZE / size, 1.0)
+    reach, blur = 2.0 * size, 0.5 / scale  # px of the photo
+    corner = lip.centre[:2] / lip.centre[2] * camera.focal + [camera.cx, camera.cy] - reach
+    # Only what is near is blurred: a photo may have a hundred megapixels.
+    margin = 4.0 * blur + 2.0
+    low = np.clip(np.floor(corner - margin), 0, [camera.width - 1, camera.height - 1])
+    high = np.clip(np.ceil(corner + 2 * reach + margin), low + 1, [camera.width, camera.height])
+    (x0, y0), (x1, y1) = low.astype(int), high.astype(int)
+    (left, top), wide = scale * (low - corner), (max(int(2 * reach * scale), 1),) * 2
+    warp = np.array([[scale, 0, left], [0, scale, top]])
+    how = cv2.INTER_AREA if scale == 1 else cv2.INTER_LINEAR
+    smooth = cv2.GaussianBlur(to_u8(pixels[y0:y1, x0:x1]), (0, 0), blur)
+    shown = cv2.warpAffine(smooth, warp, wide, flags=how, borderMode=cv2.BORDER_REPLICATE)
+    own = cv2.warpAffine(mask[y0:y1, x0:x1].astype(np.uint8), warp, wide)
+    outline = cv2.morphologyEx(own, cv2.MORPH_GRADIENT, np.ones((3, 3)))
+    return np.maximum(_edges(shown) * own, outline.astype(np.float32)), corner, scale
 
 
 def _edges(picture: np.ndarray) -> F32:

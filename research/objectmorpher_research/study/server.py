@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
 from objectmorpher.server.address import LOOPBACK
-from objectmorpher.server.front import Handler, HttpServer, Refusal
+from objectmorpher.server.front import NOTHING, Handler, HttpServer, Refusal
 
 from ..evaluation.error import EvaluationError
 from .pages import Pages, QuestionError
@@ -66,12 +66,6 @@ class _Handler(Handler):
         self.study = study
         super().__init__(*connection)
 
-    def do_GET(self) -> None:
-        self.answer(self._get)
-
-    def do_POST(self) -> None:
-        self.answer(self._post)
-
     def admit(self) -> None:
         """Refuses who asks for this computer by another name, or from another site's page."""
         host = self.headers.get("Host", "")
@@ -81,7 +75,7 @@ class _Handler(Handler):
         if origin is not None and urlsplit(origin).netloc != host:
             raise Refusal(HTTPStatus.FORBIDDEN, "another site's page cannot answer")
 
-    def _get(self) -> None:
+    def get(self) -> None:
         path = self.path.partition("?")[0]
         if path in self.study.files:
             body, kind = self.study.files[path]
@@ -92,9 +86,9 @@ class _Handler(Handler):
             if found is not None:
                 self.send_bytes(HTTPStatus.OK, found, "image/png", KEPT)
                 return
-        raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+        raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
 
-    def _post(self) -> None:
+    def post(self) -> None:
         pages = self.study.pages
         questions: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "/api/about": pages.about, "/api/begin": pages.begin, "/api/state": pages.state,
@@ -102,7 +96,7 @@ class _Handler(Handler):
         }  # fmt: skip
         question = questions.get(self.path)
         if question is None:
-            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+            raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
         said = self._said()
         try:
             told = question(said)

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from objectmorpher.server.web import MOST_EDITS, WebServer, posed_as_shown
+from objectmorpher.server.web_editor import MOST_EDITS, WebServer, posed_as_shown
 from objectmorpher_core.base.rotations import quats_from_matrices
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document.edits import EditError

@@ -1,8 +1,8 @@
 """How an object's colours are mixed with what lies behind it, as the layers of a paint program.
 
 The formulas are those of the W3C's Compositing and Blending, which OpenRaster's `svg:` names mean,
-for an opaque backdrop and a premultiplied picture; `shaders/modes.glsl` is their twin. Adobe's
-soft light differs from this one a little on backdrops darker than a quarter.
+for an opaque backdrop and a premultiplied picture; `shaders/blend_modes.glsl` is their twin.
+Adobe's soft light differs from this one a little on backdrops darker than a quarter.
 """
 
 from __future__ import annotations

@@ -25,7 +25,6 @@ import logging
 import secrets
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -59,9 +58,9 @@ from objectmorpher_core.scripting.script import EditScript
 from objectmorpher_core.session.file import encode_session
 
 from ..system.resources import resource
-from .address import check_token, is_same
-from .front import Handler, HttpServer, Refusal
-from .page import LONGEST, encode_page
+from .address import check_token
+from .front import NOTHING, Handler, HttpServer, Kept, Refusal
+from .share_page import LONGEST, encode_page
 
 log = logging.getLogger(__name__)
 
@@ -89,7 +88,6 @@ class WebEdit:
     chosen: Document | None = None
     lifted: Document | None = None
     files: dict[str, tuple[str, bytes]] = field(default_factory=dict)  # what is to be saved
-    lock: threading.Lock = field(default_factory=threading.Lock)  # one question at a time
 
     @property
     def name(self) -> str:
@@ -162,7 +160,7 @@ class WebEdit:
             return encode_page(self._lifted(), 0), "text/html; charset=utf-8"
         made = self.files.get(what.removeprefix("files/"))
         if made is None:
-            raise EditError("there is nothing of that name")
+            raise EditError(NOTHING)
         return made[1], "application/octet-stream"
 
     def _chosen(self) -> Document:
@@ -232,8 +230,7 @@ class WebServer(HttpServer):
     ) -> None:
         """`most`: bytes of a photo. Raises OSError where the address is taken, TokenError."""
         self.token, self.most = check_token(token), most
-        self.edits: OrderedDict[str, WebEdit] = OrderedDict()
-        self.edits_lock = threading.Lock()
+        self.edits: Kept[WebEdit] = Kept(MOST_EDITS, lambda edit: 1)
         self.turn = threading.Lock()  # of the one computation that runs
         self.samples = {p.name: p for p in sorted(resource("assets/samples").glob("*.jpg"))}
         super().__init__(address, partial(_WebHandler, self), connections)
@@ -241,21 +238,14 @@ class WebServer(HttpServer):
     def add(self, edit: WebEdit) -> str:
         """Keep an edit, and return the name that only its owner knows."""
         name = secrets.token_urlsafe(16)
-        with self.edits_lock:
-            self.edits[name] = edit
-            while len(self.edits) > MOST_EDITS:
-                self.edits.popitem(last=False)
+        self.edits.add(name, edit)
         return name
 
     def find(self, name: str) -> WebEdit:
         """Return the edit of that name. Raises Refusal."""
-        with self.edits_lock:
-            edit = self.edits.get(name)
-            if edit is None:
-                raise Refusal(
-                    HTTPStatus.GONE, "this edit is not kept any more: open the photo again"
-                )
-            self.edits.move_to_end(name)
+        edit = self.edits.found([name]).get(name)
+        if edit is None:
+            raise Refusal(HTTPStatus.GONE, "this edit is not kept any more: open the photo again")
         return edit
 
 
@@ -277,21 +267,12 @@ class _WebHandler(Handler):
         self.web = server
         super().__init__(*connection)
 
-    def do_GET(self) -> None:
-        self.answer(self._get)
-
-    def do_POST(self) -> None:
-        self.answer(self._post)
-
     def admit(self) -> None:
         """Refuse everything but the page itself to whoever has not the token."""
-        if self.command == "GET" and self.path in PAGE:
-            return
-        scheme, _, token = self.headers.get("Authorization", "").partition(" ")
-        if scheme != "Bearer" or not is_same(token.strip(), self.web.token):
-            raise Refusal(HTTPStatus.UNAUTHORIZED, "the token is missing or wrong")
+        if self.command != "GET" or self.path not in PAGE:
+            self.admit_with(self.web.token)
 
-    def _get(self) -> None:
+    def get(self) -> None:
         if self.path in PAGE:
             name, kind = PAGE[self.path]
             self.send_bytes(HTTPStatus.OK, resource(f"assets/web/{name}").read_bytes(), kind)
@@ -319,7 +300,7 @@ class _WebHandler(Handler):
         self.send_head(HTTPStatus.OK, kind, headers)
         self.wfile.write(body)
 
-    def _post(self) -> None:
+    def post(self) -> None:
         if self.path == "/web/edits":
             self._open()
             return
@@ -329,14 +310,14 @@ class _WebHandler(Handler):
         }  # fmt: skip
         work = works.get(what)
         if work is None:
-            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+            raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
         try:
             asked = json.loads(self.read_body(MOST_SAID))
         except ValueError:
             asked = None
         if not isinstance(asked, dict):
             raise Refusal(HTTPStatus.BAD_REQUEST, "a question is one object of JSON")
-        self._carry_out(partial(work, asked), edit.lock)
+        self._carry_out(partial(work, asked))
 
     def _open(self) -> None:
         name = Path(unquote(self.headers.get("X-Name", "photo"))).name[:200] or "photo"
@@ -353,14 +334,14 @@ class _WebHandler(Handler):
         start, _, rest = self.path.partition("/web/edits/")
         name, _, what = rest.partition("/")
         if start or not what:
-            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+            raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
         return self.web.find(name), name, what
 
-    def _carry_out(self, work: Callable[[Progress], None], lock: threading.Lock) -> None:
+    def _carry_out(self, work: Callable[[Progress], None]) -> None:
         """Answer with the progress of `work`, line by line, once it is its turn."""
         self.send_head(HTTPStatus.OK, "application/x-ndjson", {"Cache-Control": "no-store"})
         try:
-            with self._held(lock), self._held(self.web.turn):
+            with self._turn():
                 work(self._teller())
             self._line({"state": "done"})
         except (Cancelled, OSError):
@@ -372,14 +353,14 @@ class _WebHandler(Handler):
             self._line({"state": "failed", "error": "the computer that serves this has failed"})
 
     @contextmanager
-    def _held(self, lock: threading.Lock) -> Iterator[None]:
-        """Hold `lock` once it is free. Raises OSError where nobody waits for it any more."""
-        while not lock.acquire(timeout=BEAT):
+    def _turn(self) -> Iterator[None]:
+        """Begin when nobody else's computation runs. Raises OSError where nobody waits any more."""
+        while not self.web.turn.acquire(timeout=BEAT):
             self._line({"state": "waiting"})
         try:
             yield
         finally:
-            lock.release()
+            self.web.turn.release()
 
     def _teller(self) -> Progress:
         last = 0.0

@@ -1,4 +1,4 @@
-"""What a network will be asked, answered before it is: while modules are still imported."""
+"""Answers of networks that are begun before they are asked for, while modules are imported."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Answer = TypeVar("Answer")
 WATCH_EVERY = 0.02  # s
 
 
-class Ahead(Generic[Answer]):
+class EarlyAnswers(Generic[Answer]):
     """Answers about pictures that were begun ahead; each is given once, and then forgotten."""
 
     def __init__(self) -> None:
