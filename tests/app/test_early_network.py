@@ -30,10 +30,10 @@ else:
     from objectmorpher_core.pictures.image import read_picture
     from objectmorpher_core.segment import salience
     from objectmorpher_core.segment.dino_walk import DinoWalk
-    waiting = len(dino_tokens._ahead._begun), len(salience._ahead._begun)
+    waiting = len(dino_tokens._early._begun), len(salience._early._begun)
     rgb = read_picture(Path(sys.argv[1]).read_bytes()).pixels
     found, anew = DinoWalk().encode(rgb), DinoWalk().encode(rgb)  # begun early; not so
-    left = len(dino_tokens._ahead._begun), len(salience._ahead._begun)
+    left = len(dino_tokens._early._begun), len(salience._early._begun)
     print(*waiting, *left)
     print((found.tokens == anew.tokens).all(), (found.salience == anew.salience).all())
 """

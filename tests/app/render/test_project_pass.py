@@ -120,7 +120,8 @@ def test_at_rest_every_gaussian_looks_where_it_is(project_pass):
     residuals = scene.lifted.texture.u0 - scene.camera.project(
         scene.lifted.world_points(scene.lifted.gaussians.means.astype(np.float64))
     )
-    is_towards = scene.puppet.posed(None, Placement()).rest.cosines > 0  # others look aside
+    # Others look aside; what is seen edge-on may or may not, as float32 rounds it.
+    is_towards = scene.puppet.posed(None, Placement()).rest.cosines > NEARLY_NOTHING
     shown = (rows[:, COLUMNS.index(p.WEIGHT)] > 0) & is_towards
     np.testing.assert_allclose(shift[shown], residuals[shown], atol=1e-12)
     slope = rows[shown][:, [COLUMNS.index(c) for c in (p.AXX, p.AXY, p.AYX, p.AYY)]]
