@@ -102,8 +102,6 @@ class Window:
         self._options = options
         self._handle, self._size = handle, WindowSize(handle)
         self._renderer = Renderer(options.renderer)
-        flush: Any = glfw.get_proc_address("glFlush")
-        self._flush = ctypes.CFUNCTYPE(None)(flush)
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
         self.editor.filing.fov, self.editor.filing.seed = options.fov, options.seed
@@ -223,10 +221,6 @@ class Window:
         self._resize_canvas(layout.canvas, ratio)
         self._input.update(self.editor, layout.canvas, ratio)
         layout = self._lay_out()
-        is_stroke = self.editor.hand.is_busy
-        if is_stroke:  # the panels change nothing: an emulated GPU draws while they are laid out
-            self._draw(layout.canvas, ratio, size)
-            self._flush()
         draw_menu(self.editor, layout.menu)
         if self.editor.document is None:
             self._start.draw(self.editor, layout.canvas)
@@ -242,8 +236,7 @@ class Window:
         if (title := self._title.changed(self.editor, self._is_quiet)) is not None:
             glfw.set_window_title(self._handle, title)
         imgui.render()
-        if not is_stroke:
-            self._draw(layout.canvas, ratio, size)
+        self._draw(layout.canvas, ratio, size)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         landmarks.write()
         self._save_settings()
