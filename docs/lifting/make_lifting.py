@@ -3,7 +3,8 @@
 python docs/lifting/make_lifting.py [figures | quick [NAME ...]]
 
 `figures` prints, as JSON, the means over the solids for which nothing has to be fetched. `quick`
-prints how turned outlines and newly shown sides look, of the product alone: a few minutes.
+prints how turned outlines and newly shown sides look, of the product alone: a few minutes. Without
+either the whole page is made, in half an hour.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from depths import depth_scores
 from motorcycle import results
 from page import write_page
 from pictures import draw_backs, draw_real, draw_solids, draw_thickness
-from solids import MADE, SOLIDS
+from sheet import PHOTOS, draw_sheet
+from solids import HELD_OUT, MADE, SOLIDS
 from turned_looks import looks
 from turning import Row, make_scene, means, measured, row_of
 
@@ -43,6 +45,8 @@ def quick(names: list[str]) -> None:
 
 def main() -> None:
     meshes = fetched()
+    looked = {name: looks(make_scene(name, meshes)) for name in (*SOLIDS, *HELD_OUT)}
+    photos = draw_sheet(PHOTOS, FOLDER / "turned.jpg")
     rows: list[Row] = []
     shown = []
     for name in SOLIDS:
@@ -57,7 +61,7 @@ def main() -> None:
     draw_backs(FOLDER / "backs.jpg")
     draw_thickness(FOLDER / "thickness.jpg")
     (FOLDER / "README.md").write_text(
-        write_page(rows, depth_scores(meshes), results()), encoding="utf-8"
+        write_page(rows, looked, photos, depth_scores(meshes), results()), encoding="utf-8"
     )
 
 

@@ -40,6 +40,8 @@ BOXES = {
     "china": (120.0, 100.0, 560.0, 330.0), "logo": (5.0, 5.0, 495.0, 495.0),
 }  # fmt: skip
 
+PHOTOS = [*CLICKS, "bowl", *BOXES]
+
 
 @dataclass(frozen=True)
 class Row:
@@ -112,18 +114,22 @@ def measured(name: str, document: Document) -> tuple[list[Row], list[np.ndarray]
     return rows, pictures
 
 
-def main(names: list[str]) -> None:
-    """Prints a line a turn, and writes turned.jpg where all photos are asked for."""
-    sheet = []
-    for name in names or [*CLICKS, "bowl", *BOXES]:
+def draw_sheet(names: list[str], path: Path) -> list[Row]:
+    """Writes the sheet of the photos called `names`, and returns what is measured of them."""
+    sheet: list[list[np.ndarray]] = []
+    found: list[Row] = []
+    for name in names:
         document = lifted(name)
         rows, pictures = measured(name, document)
         print("\n".join(map(str, rows)), flush=True)
+        found += rows
         sheet.append([document.photo.pixels, *pictures])
     labels = [f"yaw {a:+.0f}" if a else f"pitch {b:+.0f}" for a, b, _ in TURNS]
-    path = FOLDER / "turned.jpg" if not names else Path.cwd() / f"turned-{'-'.join(names)}.jpg"
     _write(path, ["the photo", *labels], sheet, WIDTH)
+    return found
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    asked = sys.argv[1:]
+    name = f"turned-{'-'.join(asked)}.jpg"
+    draw_sheet(asked or PHOTOS, Path.cwd() / name if asked else FOLDER / "turned.jpg")
