@@ -27,29 +27,24 @@ from .pictures.image import array_of, encode_array, encode_mask, encode_pil, pil
 from .pipeline import Edited, continue_script, lift_first, open_photo, select
 from .pipeline import replay as replay_document
 from .scripting.animation import Clip, frames
-from .scripting.outputs import encode_output, output_picture
-from .scripting.report import provenance
-from .scripting.script import (
-    ALONE,
+from .scripting.options import (
     CHOOSING,
+    SHAPE,
     EditScript,
-    Others,
     ScriptError,
-    beside,
-    parse_scripts,
+    options_of,
     said_by,
     script_from,
 )
+from .scripting.outputs import encode_output, output_picture
+from .scripting.report import provenance
+from .scripting.script import ALONE, Others, beside, parse_scripts
 
 __all__ = ["Edit", "Result", "Shape", "open", "read_scripts", "replay"]
 
 File = str | os.PathLike[str]
 IN_MEMORY = "photo"  # name of a photo that is no file
 PREVIEW = 1024  # px, longer side of the picture that a notebook shows
-OF_THE_SHAPE = {
-    "lift", "splats", "flip", "gaussians", "thickness", "back", "symmetry", "floating", "shape",
-    "trust", "no_depth", "hidden", "decontaminate",
-}  # fmt: skip
 
 
 class Shape(TypedDict, total=False):
@@ -261,7 +256,7 @@ class Edit:
             return replace(edit, document=fresh)
         if "mask" in said and script.mask is not None:
             return edit.mask(script.mask)
-        return edit._unlifted if (CHOOSING | OF_THE_SHAPE) & said else edit
+        return edit._unlifted if options_of(CHOOSING, SHAPE) & said else edit
 
     @property
     def _unlifted(self) -> Edit:

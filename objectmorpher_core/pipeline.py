@@ -41,9 +41,10 @@ from .lift.registration.imported import ImportTarget, Source, place_import, regi
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
 from .raster.posed import PosedSplats
 from .scripting import runner
+from .scripting.options import EditScript, ScriptError
 from .scripting.report import Stopwatch, build_report
 from .scripting.runner import RefineOptions, has_left, prompt_of, with_plate, with_refinement
-from .scripting.script import ALONE, EditScript, FurtherObject, Others, ScriptError
+from .scripting.script import ALONE, FurtherObject, Others
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matting.matte import cut_out

@@ -59,7 +59,7 @@ def _edited() -> Document:
     """The main job."""
     from .pictures.image import Picture, encode_mask, encode_picture
     from .pipeline import run_script
-    from .scripting.script import EditScript, HandleMove
+    from .scripting.options import EditScript, HandleMove
     from .segment.matting.closed_form import affine, applied
     from .segment.matting.halving import halved_pixels
     from .segment.pieces.pieces import Pieces

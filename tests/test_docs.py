@@ -20,7 +20,7 @@ from PIL import Image, ImageSequence
 
 import objectmorpher_core as om
 from objectmorpher.cli import parser as cli
-from objectmorpher_core.scripting.script import script_from
+from objectmorpher_core.scripting.options import script_from
 from tests.tree import over
 
 ROOT = Path(__file__).parents[1]

@@ -12,7 +12,7 @@ from objectmorpher_core.compose.shadow.old_shadow import without_shadow
 from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import open_photo, run_script, select
-from objectmorpher_core.scripting.script import EditScript, FillFrom
+from objectmorpher_core.scripting.options import EditScript, FillFrom
 from objectmorpher_core.segment.matting.matte import build_matte
 
 

@@ -17,7 +17,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import AS_SEEN, Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import export, lift_mask, make_plate, open_photo, select
-from objectmorpher_core.scripting.script import EditScript
+from objectmorpher_core.scripting.options import EditScript
 
 SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
 CLICKS = {

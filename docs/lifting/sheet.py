@@ -23,7 +23,7 @@ from objectmorpher_core.document.model import DeformSettings, Document, Placemen
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, open_photo, select
 from objectmorpher_core.raster.trust import trust_in
-from objectmorpher_core.scripting.script import EditScript
+from objectmorpher_core.scripting.options import EditScript
 
 FOLDER = Path(__file__).resolve().parent
 TURNS = [(a, 0.0, 0.0) for a in (-35.0, -25.0, -15.0, 15.0, 25.0, 35.0)]

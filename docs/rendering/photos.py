@@ -20,7 +20,7 @@ from objectmorpher_core.pipeline import lift_mask, open_photo, select
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels
-from objectmorpher_core.scripting.script import EditScript
+from objectmorpher_core.scripting.options import EditScript
 
 SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
 TURN = Placement(turn=(20, 0, 0))

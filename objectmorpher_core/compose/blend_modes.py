@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import F32
-from ..document.settings import MULTIPLY, NORMAL, SCREEN
+from ..document.bounds import MULTIPLY, NORMAL, SCREEN
 
 DARK = np.float32(0.25)  # from which on soft light brightens by the square root
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..base.pixels import crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
+from ..document.bounds import NORMAL
 from ..document.model import Document, EditObject, Matte, Plate
-from ..document.settings import NORMAL, Refined
+from ..document.settings import Refined
 from .blend import Box
 from .composite import Composite, Moved, composite, drawn_alone, whole_box
 from .order import holes

@@ -18,6 +18,7 @@ from ..base.arrays import F32, F64, I32, U8, Mask, Pixels, Selection, frozen
 from ..base.camera import Camera
 from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
+from .bounds import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 from .gaussians import Gaussians
 from .pose import UNHELD, Base, Handle, Pose
 from .rig import Rig
@@ -174,9 +175,6 @@ class Sides:
 
 
 GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape
-BACKS = ("auto", "mirrored", "continued")  # what the side looks like that the photo does not show
-KINDS = ("auto", "free", "round", "flat", "box", "tube")  # of shapes; see lift.shapes
-LEAST_THICKNESS, MOST_THICKNESS = 0.05, 3.0  # x what the silhouette says
 
 
 @dataclass(frozen=True, eq=False)

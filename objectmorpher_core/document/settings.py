@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import F32, U8, Pixels, frozen
+from .bounds import MODES, MOST_BLUR, MOST_EXPOSURE, MOST_SATURATION, MOST_SHARPNESS, NORMAL
 
 # From where the background is to be filled in, as the user says it.
 
@@ -71,13 +72,8 @@ class Shadow:
 
 # How an object looks otherwise than in the photo, as of a layer of a paint program.
 
-MOST_EXPOSURE = 3.0  # stops, up or down
-MOST_SATURATION = 2.0
 GAMMA = 2.2  # of encoded values: a stop of linear light is a factor of them
 WARMTH = 0.5  # stops, by which red rises and blue falls at a warmth of 1
-MOST_SHARPNESS = 3.0
-MOST_BLUR = 50.0  # px
-NORMAL, MULTIPLY, SCREEN, SOFT_LIGHT = MODES = ("normal", "multiply", "screen", "soft light")
 
 
 @dataclass(frozen=True)

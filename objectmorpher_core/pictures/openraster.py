@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..compose.layers import Layer
-from ..document.settings import MULTIPLY, NORMAL, SCREEN, SOFT_LIGHT
+from ..document.bounds import MULTIPLY, NORMAL, SCREEN, SOFT_LIGHT
 from .image import Picture, at_most, encode_picture, to_u8
 
 ENDING = ".ora"

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.threads import core_count
 from ..compose.layers import Layer
-from ..document.settings import MULTIPLY, NORMAL, SCREEN, SOFT_LIGHT
+from ..document.bounds import MULTIPLY, NORMAL, SCREEN, SOFT_LIGHT
 from .image import ImageError, Picture
 
 MOST_SIDE = 30_000  # px, of the format

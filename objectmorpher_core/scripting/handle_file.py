@@ -19,7 +19,7 @@ from ..base.quoting import shown
 from ..deform.puppet import puppet_of
 from ..document import edits
 from ..document.model import Document, EditObject
-from .script import ScriptError
+from .options import ScriptError
 
 MOST_BYTES = 1 << 20
 NEAR = 1e-9  # object diameters: a handle that was moved less stays as it is

@@ -27,7 +27,7 @@ from ..pipeline import Edited, export
 from ..raster import tiles
 from ..splat_files import encode as encode_splats
 from .animation import Clip, frames
-from .script import ScriptError
+from .options import ScriptError
 
 # The distance of the lifted objects as a picture for other programs.
 

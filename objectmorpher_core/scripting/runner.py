@@ -37,8 +37,9 @@ from ..document.model import (
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
+from .options import FINISH, EditScript, ScriptError, options_of
 from .report import Stopwatch
-from .script import ALONE, OF_A_FINISH, EditScript, FurtherObject, Others, ScriptError
+from .script import ALONE, FurtherObject, Others
 
 # What a script says about an object that is lifted: handles, pose, place, light, copies, order.
 
@@ -224,10 +225,10 @@ def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
 
 
 def finished(
-    document: Document, k: int, script: EditScript, said: frozenset[str] = OF_A_FINISH
+    document: Document, k: int, script: EditScript, said: frozenset[str] = options_of(FINISH)
 ) -> Document:
     """Object `k` as opaque and coloured as the script has `said`."""
-    changes = {name: getattr(script, name) for name in OF_A_FINISH & said}
+    changes = {name: getattr(script, name) for name in options_of(FINISH) & said}
     return edits.set_finish(document, k, replace(document.objects[k].finish, **changes))
 
 

@@ -19,7 +19,7 @@ from PIL import Image, ImageSequence
 from objectmorpher.cli import parser as cli
 from objectmorpher_core.compose import BACKENDS
 from objectmorpher_core.pictures.image import read_picture
-from objectmorpher_core.scripting.script import EditScript
+from objectmorpher_core.scripting.options import EditScript
 from objectmorpher_core.splat_files.splats.ply import decode_ply
 from tests import shapes
 from tests.tree import PYTHONPATH, over

@@ -26,8 +26,8 @@ from objectmorpher_core.document.pose import Pose
 from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
 from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.scripting.animation import Clip, frames, share_at, shrunk, station_at
+from objectmorpher_core.scripting.options import script_from
 from objectmorpher_core.scripting.outputs import Export
-from objectmorpher_core.scripting.script import script_from
 from objectmorpher_core.session.file import decode_session, encode_session
 from objectmorpher_core.session.tree import SessionError
 from tests import shapes

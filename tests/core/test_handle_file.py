@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from objectmorpher_core.document.edits import set_placement
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.scripting.handle_file import encode_handles, with_handles
-from objectmorpher_core.scripting.script import ScriptError
+from objectmorpher_core.scripting.options import ScriptError
 from tests import shapes
 
 

@@ -22,7 +22,7 @@ from objectmorpher_core.pipeline import (
     run_script,
     select,
 )
-from objectmorpher_core.scripting.script import EditScript, ScriptError, script_from
+from objectmorpher_core.scripting.options import EditScript, ScriptError, script_from
 from tests import shapes
 from tests.tree import quick
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pipeline import Edited, run_script
+from objectmorpher_core.scripting.options import script_from
 from objectmorpher_core.scripting.report import STAGES, Stopwatch, peak_memory_mb
-from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
 pytestmark = pytest.mark.usefixtures("lifted_once")

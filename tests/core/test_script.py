@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 
 import pytest
 
-from objectmorpher_core.scripting.script import (
-    BatchItem,
+from objectmorpher_core.api import Shape
+from objectmorpher_core.document.settings import Finish
+from objectmorpher_core.scripting.options import (
+    FINISH,
+    OPTIONS,
+    PARTS,
+    SHAPE,
     EditScript,
     HandleMove,
     ScriptError,
-    parse_scripts,
+    options_of,
     script_from,
 )
+from objectmorpher_core.scripting.script import BatchItem, parse_scripts
 
 FULL = {
     "key": [{"turn": [5.0, 0.0, 0.0], "pin": [[1.0, 2.0]]}, {}],
@@ -41,6 +48,12 @@ def test_every_option_has_a_place():
         getattr(script, name) != getattr(EditScript(), name)
         for name in EditScript.__dataclass_fields__
     )
+
+
+def test_the_parts_of_an_edit_are_those_of_the_document_and_the_library():
+    assert options_of(FINISH) == {field.name for field in fields(Finish)}
+    assert options_of(SHAPE) == set(Shape.__annotations__)
+    assert set().union(*(options_of(part) for part in PARTS)) == set(OPTIONS)
 
 
 def test_a_script_in_a_file_says_the_same():

@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-from objectmorpher_core.scripting.script import BatchItem, EditScript, parse_scripts, script_text
+from objectmorpher_core.scripting.options import EditScript
+from objectmorpher_core.scripting.script import BatchItem, parse_scripts, script_text
 
 SCRIPTS = (
     {},

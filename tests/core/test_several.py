@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pipeline import Edited, replay, run_script
-from objectmorpher_core.scripting.script import BatchItem, ScriptError, parse_scripts
+from objectmorpher_core.scripting.options import ScriptError
+from objectmorpher_core.scripting.script import BatchItem, parse_scripts
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 from tests.tree import over

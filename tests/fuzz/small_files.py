@@ -30,7 +30,8 @@ from objectmorpher_core.models.weight_folder import (
     check_folder,
     check_safetensors,
 )
-from objectmorpher_core.scripting.script import BatchItem, EditScript, ScriptError, parse_scripts
+from objectmorpher_core.scripting.options import EditScript, ScriptError
+from objectmorpher_core.scripting.script import BatchItem, parse_scripts
 
 from .checks import Reader, check_finite, check_same, refusing
 

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from objectmorpher.editor.settings import Settings, read_settings, write_settings
 from objectmorpher.server.message import MessageError, decode, encode
 from objectmorpher.server.table import types
-from objectmorpher_core.scripting.script import EditScript, ScriptError, parse_scripts, script_from
+from objectmorpher_core.scripting.options import EditScript, ScriptError, script_from
+from objectmorpher_core.scripting.script import parse_scripts
 from tests.fuzz.checks import check_finite, check_same, check_sentence
 
 PLAIN = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)

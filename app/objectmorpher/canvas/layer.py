@@ -9,8 +9,8 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import U8
 from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.bounds import NORMAL
 from objectmorpher_core.document.model import Document, EditObject
-from objectmorpher_core.document.settings import NORMAL
 
 from ..editor.view import Shown
 from .shape import CanvasShape

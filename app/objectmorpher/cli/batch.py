@@ -16,10 +16,10 @@ from typing import Any
 
 from objectmorpher_core.base.files import make_folder, write_all
 from objectmorpher_core.pictures.image import ENDINGS, encode_picture
+from objectmorpher_core.scripting.options import files_of
 from objectmorpher_core.scripting.script import (
     BatchItem,
     beside,
-    files_of,
     parse_scripts,
     read_scripts,
     script_text,

@@ -18,18 +18,11 @@ from objectmorpher_core.pictures.image import ENDINGS, encode_mask, encode_pictu
 from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.scripting.animation import Clip
+from objectmorpher_core.scripting.options import EditScript, ScriptError, files_of, script_from
 from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, Export, encode_output
 from objectmorpher_core.scripting.report import provenance
 from objectmorpher_core.scripting.runner import refuse_missing
-from objectmorpher_core.scripting.script import (
-    BatchItem,
-    EditScript,
-    ScriptError,
-    beside,
-    files_of,
-    read_scripts,
-    script_from,
-)
+from objectmorpher_core.scripting.script import BatchItem, beside, read_scripts
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 from objectmorpher_core.splat_files.meshes.textured import plain_glb

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from objectmorpher_core.base.quoting import count_range, reason
+from objectmorpher_core.scripting.options import OBJECT, OPTIONS, Option
 
 from .. import __version__
 from .command_parser import (
@@ -137,20 +138,29 @@ def window_options(options: argparse.Namespace) -> WindowOptions:
     )  # fmt: skip
 
 
-def _add_choosing(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("choosing the object (px of the upright photo)")
-    add = group.add_argument
-    add("--click", action="append", type=_list(2, 2), metavar="X,Y", help="on the object")
-    add("--not-click", action="append", type=_list(2, 2), metavar="X,Y", help="not on the object")
-    add("--box", type=_list(4, 4), metavar="X0,Y0,X1,Y1", help="around it")
-    add("--subject", action="store_true", default=None, help="the photo's main subject")
-    add("--mask", metavar="M.png", help="a mask picture; overrides all of these")
-    add(
-        "--segment",
-        metavar="NAME",
-        help="backend: auto, dino, grabcut, subject, sam2, sam, sam3, sam-onnx, or one model's id",
-    )
-    add("--seed", type=int, metavar="N", help="default 0; the same seed gives the same bytes")
+def _add_options(parser: argparse.ArgumentParser, *headings: str) -> None:
+    """The options of an edit that stand below these headings, or all."""
+    groups: dict[str, argparse._ArgumentGroup] = {}
+    for name, option in OPTIONS.items():
+        if headings and option.heading not in headings:
+            continue
+        if option.heading not in groups:
+            groups[option.heading] = parser.add_argument_group(option.heading)
+        shape = {} if option.placeholder is None else {"metavar": option.placeholder}
+        flag = f"--{name.replace('_', '-')}"
+        groups[option.heading].add_argument(flag, help=option.help, **shape, **_reading(option))
+
+
+def _reading(option: Option) -> dict[str, Any]:
+    """How argparse reads the values of an option; what is not said there is None."""
+    several = {"points": _list(2, 2), "handles": _handle, "sources": _fill_from, "keys": _key}
+    one = {"number": float, "whole": int, "numbers": _list(*option.values.counts)}
+    kind = option.values.kind
+    if kind == "flag":
+        return {"action": "store_true", "default": None}
+    if kind in several:
+        return {"action": "append", "type": several[kind]}
+    return {"type": one[kind]} if kind in one else {}
 
 
 def _add_edit(parser: argparse.ArgumentParser) -> None:
@@ -162,97 +172,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
         help="a picture file; a script may name it instead",
     )
     parser.add_argument("-o", "--out", type=Path, metavar="OUT", help="the edited photo")
-    _add_choosing(parser)
-    add = parser.add_argument_group("backends").add_argument
-    add("--inpaint", metavar="NAME", help="auto, pixelhacker, lama, migan, patchmatch or telea")
-    add("--lift", metavar="NAME", help="auto, relief, trellis, cupid, or a worker")
-    add("--fill-from", action="append", type=_fill_from, metavar="X,Y:X2,Y2[,R]",
-        help="fill the background within R px of X2,Y2 from around X,Y")  # fmt: skip
-    add("--refine", metavar="NAME",
-        help="none (also auto), harmonise (light, grain, focus), qwen or klein")  # fmt: skip
-    add(
-        "--refine-strength",
-        type=float,
-        metavar="S",
-        help="how much of a network's change to keep, 0 to 1",
-    )
-    add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
-    add = parser.add_argument_group("the object's shape").add_argument
-    add(
-        "--gaussians",
-        type=int,
-        metavar="N",
-        help="how many Gaussians the object gets, default 16000",
-    )
-    add(
-        "--thickness",
-        type=float,
-        metavar="S",
-        help="a factor on what its outline suggests, default 1",
-    )
-    add("--back", metavar="KIND", help="the unseen side: auto, mirrored or continued")
-    add("--symmetry", metavar="auto|yes|no", help="whether it looks the same left and right")
-    add("--floating", action="store_true", default=None,
-        help="it does not stand on the ground: ignore where its foot is")  # fmt: skip
-    add("--shape", metavar="KIND", help="its kind: auto, free, round, flat, box or tube")
-    add(
-        "--trust",
-        type=float,
-        metavar="T",
-        help="weight of the shape network, 0 (the outline alone) to 1 (default)",
-    )
-    add("--no-depth", action="store_true", default=None,
-        help="ignore the depth model even where one is installed")  # fmt: skip
-    add("--hidden", metavar="M.png", help="a mask of its parts that are hidden behind something")
-    add("--decontaminate", type=float, metavar="S",
-        help="take this share of the background's colour out of its edge, 0 to 1")  # fmt: skip
-    add("--opacity", type=float, metavar="S", help="how opaque it is, 0 to 1 (default)")
-    add("--exposure", type=float, metavar="STOPS", help="brighten or darken it, -3 to 3 stops")
-    add("--warmth", type=float, metavar="W", help="its colour, -1 (blue) to 1 (amber)")
-    add("--saturation", type=float, metavar="S", help="its colours, 0 (grey) to 2; default 1")
-    add("--sharpness", type=float, metavar="S", help="sharpen its fine detail, 0 to 3 times")
-    add("--blur", type=float, metavar="PX", help="blur it by so many pixels, 0 to 50")
-    add("--blend-mode", type=lambda name: name.replace("-", " "), metavar="MODE",
-        help="mix it with what is behind it: normal, multiply, screen or soft-light")  # fmt: skip
-    add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
-    add("--flip", action="store_true", default=None, help="turn that file upside down")
-    add = parser.add_argument_group("deforming").add_argument
-    add("--pin", action="append", type=_list(2, 2), metavar="X,Y", help="a point that stays")
-    add("--handle", action="append", type=_handle, metavar="X,Y:X2,Y2[,DZ]",
-        help="drag the surface point at X,Y to X2,Y2, and DZ object diameters away")  # fmt: skip
-    add("--deform", metavar="MODE", help="arap (default) or laplacian")
-    add("--links", metavar="KIND", help="geodesic (default) or euclidean")
-    add(
-        "--faithful",
-        action="store_true",
-        default=None,
-        help="the method exactly as printed in the paper",
-    )
-    add("--nodes", type=int, metavar="N", help="control points, 4 to 4096, default 512")
-    add("--stiffness", type=float, metavar="S",
-        help="reach of the links between control points, 0.25 to 4, default 1")  # fmt: skip
-    add("--stretch-limit", type=float, metavar="S",
-        help="stop handles before a part becomes S times as long")  # fmt: skip
-    add("--split", action="store_true", default=None,
-        help="split Gaussians that are stretched far")  # fmt: skip
-    add = parser.add_argument_group("placing the whole object, after the handles").add_argument
-    add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
-    add("--turn", type=_list(1, 3), metavar="YAW[,PITCH,ROLL]",
-        help="degrees; a positive yaw turns its front to the left")  # fmt: skip
-    add("--scale", type=float, metavar="S", help="scale factor")
-    add("--key", action="append", type=_key, metavar="POSE",
-        help="a further pose for --video keys, such as 'turn=-20 handle=X,Y:X2,Y2'")  # fmt: skip
-    add("--shadow", metavar="auto|none",
-        help="auto (default): its shadow in the photo goes along")  # fmt: skip
-    add(
-        "--remove",
-        action="store_true",
-        default=None,
-        help="take the object away and show what is behind it",
-    )
-    add("--front", action="append", type=_list(2, 2), metavar="X,Y",
-        help="on something that stays in front of the object")  # fmt: skip
-    add("--front-mask", metavar="M.png", help="a mask of something that stays in front")
+    _add_options(parser)
     add = parser.add_argument_group("scripts and further outputs").add_argument
     add(
         "--script",
@@ -305,7 +225,7 @@ def _add_select(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="white where the object is",
     )
-    _add_choosing(parser)
+    _add_options(parser, OBJECT)
 
 
 def _add_video(add: Callable[..., object]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
-from objectmorpher_core.document.settings import MODES, NORMAL
+from objectmorpher_core.document.bounds import MODES, NORMAL
 
 from ..canvas.layer import CanvasLayer
 from ..editor.view import ViewState

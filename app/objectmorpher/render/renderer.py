@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from objectmorpher_core.base.arrays import U8
-from objectmorpher_core.document.settings import NORMAL
+from objectmorpher_core.document.bounds import NORMAL
 
 from ..canvas.layer import CanvasLayer
 from ..canvas.memo import same

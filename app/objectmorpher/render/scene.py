@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from objectmorpher_core.base.arrays import F32, Pixels, Selection
 from objectmorpher_core.base.brush import Box
 from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.bounds import NORMAL
 from objectmorpher_core.document.model import Plate
-from objectmorpher_core.document.settings import NORMAL
 
 from ..canvas.layer import CanvasLayer
 

@@ -52,9 +52,9 @@ from objectmorpher_core.pictures.image import (
     resized,
     to_u8,
 )
+from objectmorpher_core.scripting.options import EditScript
 from objectmorpher_core.scripting.outputs import encode_output
 from objectmorpher_core.scripting.runner import has_left, with_plate
-from objectmorpher_core.scripting.script import EditScript
 from objectmorpher_core.session.file import encode_session
 
 from ..system.resources import resource

@@ -16,8 +16,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ...base.arrays import F32, F64
 from ...base.camera import Camera
+from ...document.bounds import NORMAL
 from ...document.model import Document, EditObject, LiftedObject, Matte
-from ...document.settings import AS_IN_THE_PHOTO, NORMAL, Shadow
+from ...document.settings import AS_IN_THE_PHOTO, Shadow
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, build_levels
 from ..plate.plate import plate_cover

@@ -66,7 +66,7 @@ def _rows(case: BenchCase, again: int, asked: float) -> list[Row]:
     """The rows of one photo, in this process; it was `asked` for then, s since 1970."""
     from objectmorpher_core.pictures.image import encode_picture
     from objectmorpher_core.pipeline import run_script
-    from objectmorpher_core.scripting.script import EditScript
+    from objectmorpher_core.scripting.options import EditScript
 
     start, reports = time.time() - asked, []
     script = EditScript(click=(case.click,), turn=TURN)

@@ -16,8 +16,9 @@ from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.bounds import MODES
 from objectmorpher_core.document.model import Document, Placement
-from objectmorpher_core.document.settings import MODES, Finish, Shadow
+from objectmorpher_core.document.settings import Finish, Shadow
 from objectmorpher_core.pictures.screen_colours import screen_table
 from objectmorpher_core.pipeline import make_plate
 from tests import focussed, shapes

@@ -12,8 +12,9 @@ from objectmorpher_core.base.arrays import Pixels
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.layers import BACKGROUND, EMPTY, PHOTO, UNTOUCHED, Layer, layers
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.bounds import MODES
 from objectmorpher_core.document.model import Document, Photo, Placement
-from objectmorpher_core.document.settings import MODES, Finish, Shadow
+from objectmorpher_core.document.settings import Finish, Shadow
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes

@@ -16,7 +16,7 @@ from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Matte, Placement
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.scripting.script import script_from
+from objectmorpher_core.scripting.options import script_from
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
 from tests.shadow_scenes import scene

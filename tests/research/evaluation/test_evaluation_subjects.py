@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
-from objectmorpher_core.scripting.script import EditScript
+from objectmorpher_core.scripting.options import EditScript
 from objectmorpher_research.evaluation.error import EvaluationError
 from objectmorpher_research.evaluation.paper.interaction_log import (
     Event,

@@ -8,15 +8,17 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core import compose
-from objectmorpher_core.document.settings import (
-    LEAST_FEATHER,
+from objectmorpher_core.document.bounds import (
     MODES,
     MOST_BLUR,
     MOST_EXPOSURE,
-    MOST_FEATHER,
     MOST_SATURATION,
-    MOST_SHADOW,
     MOST_SHARPNESS,
+)
+from objectmorpher_core.document.settings import (
+    LEAST_FEATHER,
+    MOST_FEATHER,
+    MOST_SHADOW,
     USUAL_DEFOCUS,
     USUAL_GRAIN,
     USUAL_HARMONY,

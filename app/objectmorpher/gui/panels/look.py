@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from objectmorpher_core.document.model import LEAST_THICKNESS, MOST_THICKNESS
+from objectmorpher_core.document.bounds import LEAST_THICKNESS, MOST_THICKNESS
 
 from ...canvas.painter import shown_now
 from ...commands import COMMANDS, keys_of, run, why_not

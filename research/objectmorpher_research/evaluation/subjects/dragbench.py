@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher_core.scripting.script import XY, BatchItem, EditScript, HandleMove
+from objectmorpher_core.scripting.options import XY, EditScript, HandleMove
+from objectmorpher_core.scripting.script import BatchItem
 
 from ..error import EvaluationError
 from .guidance import EditGuidance, from_item

@@ -18,7 +18,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from objectmorpher_core.pictures.image import ImageError, read_picture
-from objectmorpher_core.scripting.script import BatchItem, EditScript
+from objectmorpher_core.scripting.options import EditScript
+from objectmorpher_core.scripting.script import BatchItem
 
 from ..error import EvaluationError
 from .guidance import EditGuidance, from_item

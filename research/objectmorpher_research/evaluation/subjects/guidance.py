@@ -9,13 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from objectmorpher_core.pictures.image import ImageError, read_picture
-from objectmorpher_core.scripting.script import (
-    XY,
-    BatchItem,
-    EditScript,
-    ScriptError,
-    parse_scripts,
-)
+from objectmorpher_core.scripting.options import XY, EditScript, ScriptError
+from objectmorpher_core.scripting.script import BatchItem, parse_scripts
 
 from ..error import EvaluationError
 

@@ -17,8 +17,8 @@ from objectmorpher_core.compose.composite import (
 )
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.bounds import LEAST_THICKNESS
 from objectmorpher_core.document.model import (
-    LEAST_THICKNESS,
     DeformSettings,
     Document,
     LiftedObject,
@@ -32,8 +32,8 @@ from objectmorpher_core.document.model import (
 from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, open_photo
+from objectmorpher_core.scripting.options import EditScript
 from objectmorpher_core.scripting.runner import with_plate
-from objectmorpher_core.scripting.script import EditScript
 
 from .cases import TruthCase, TruthGuidance
 from .outcome import EditOutcome

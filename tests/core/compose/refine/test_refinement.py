@@ -133,8 +133,8 @@ def test_it_is_the_topmost_layer_and_the_pile_is_the_export():
 
 
 def test_every_backend_is_known_to_scripts():
+    from objectmorpher_core.scripting.options import EditScript, ScriptError
     from objectmorpher_core.scripting.runner import refuse_missing
-    from objectmorpher_core.scripting.script import EditScript, ScriptError
 
     for name in refine.BACKENDS:
         if refine.missing(name) is not None:

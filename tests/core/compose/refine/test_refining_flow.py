@@ -26,8 +26,8 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.models import device, ledger
 from objectmorpher_core.pipeline import run_script
+from objectmorpher_core.scripting.options import script_from
 from objectmorpher_core.scripting.runner import RefineOptions, coarse_edit
-from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
 pytestmark = pytest.mark.slow
