@@ -27,6 +27,7 @@ from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of
 from . import shape_look
 from .body import MIDDLE, ReliefBody
 from .canvas import ReliefCanvas, bilinear
+from .closing import closed
 from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow
@@ -163,7 +164,8 @@ def _recognised(
     """`body` as the plain shape that it looks like, else leaning as far as things do."""
     shape = recognised(seen, settings.kind)
     if shape is None or _contradicts(shape, body, settings):
-        return leaning(body, camera)
+        body = leaning(body, camera)
+        return body if body.standing.prism is not None else closed(body)
     return completed(body, shape, camera, settings.thickness, settings.trust)
 
 

@@ -47,6 +47,10 @@ class ReliefSilhouette:
         extent = float(max(crop.shape))
         cell = max(1.0, extent / GRID)
         inside = np.pad(_reduced(crop, cell), 1)
+        if mask[-1].any():  # the frame may cut the last cells, which are no less inside for that
+            inside[-2] |= inside[-3]
+        if mask[:, -1].any():
+            inside[:, -2] |= inside[:, -3]
         corner = (left - extension[2] - cell, top - extension[0] - cell)
         is_open = (
             bool(mask[0].any()), bool(mask[-1].any()),

@@ -159,3 +159,13 @@ def test_a_hair_of_a_huge_photo_is_not_lost():
     mask = np.zeros((900, 2000), bool)
     mask[450, 100:1900] = True  # a seventh of a cell
     assert ReliefSilhouette.of(mask).inside.any()
+
+
+@pytest.mark.parametrize("height", range(400, 412))
+def test_what_leaves_the_photo_has_no_outline_at_the_frame(height):
+    mask = np.zeros((height, height + 50), bool)
+    mask[100:, 120:] = True
+    outline = ReliefSilhouette.of(mask)
+    assert outline.inside[-2, -2]
+    far = outline.depth[-2, -2]
+    assert far > 0.9 * outline.depth.max()
