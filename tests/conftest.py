@@ -111,10 +111,26 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 LONG = (  # files and folders of which a test takes long: they begin
-    "tests/fuzz", "tests/faults", "tests/soak", "test_train", "test_autosave", "test_worker",
-    "test_window", "test_first_use", "test_refin", "app/editing", "app/tools", "tests/app",
-    "core/compose",
+    "tests/fuzz", "tests/faults", "tests/soak", "test_train", "core/segment", "test_autosave",
+    "test_worker", "test_window", "test_first_use", "test_refin", "app/editing", "app/tools",
+    "tests/app", "core/compose",
 )  # fmt: skip
+
+
+# Their files know together what networks made of the photos: one process runs them.
+TOGETHER = ("tests/core/segment",)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    from xdist.scheduler.loadfile import LoadFileScheduling
+
+    class ByFiles(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = super()._split_scope(nodeid)
+            return next((folder for folder in TOGETHER if nodeid.startswith(folder)), file)
+
+    return ByFiles(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -88,12 +88,14 @@ def test_what_other_objects_cover_is_not_chosen(segmenter, is_trained, disc, dis
     assert not is_trained or overlap(mask, half) > SKETCH
 
 
-def test_a_click_beside_the_box_says_that_it_was_too_small(segmenter, is_trained, disc):
+def test_a_click_beside_the_box_says_that_it_was_too_small(
+    segmenter, is_trained, disc, disc_embedding
+):
     asked = Prompt((Click(75, 75), Click(130, 75)), box=(60, 35, 120, 115))
     check_prompt(disc, asked)
     if not is_trained:  # random weights may see nothing at all
         return
-    mask = segmenter.segment(disc, asked, None, silent)
+    mask = segmenter.segment(disc, asked, disc_embedding, silent)
     assert mask[75, 75] and mask[75, 130]
     assert overlap(mask, ellipses(disc.shape, (100, 75, 40, 40))) > SKETCH
 

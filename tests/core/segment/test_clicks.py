@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import time
 from functools import cache
-from typing import Any
 
 import cv2
 import numpy as np
@@ -16,6 +15,7 @@ from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.document.model import BesidePrompt, Click, Prompt
 from objectmorpher_core.pipeline import Reading
 from tests.core.segment.composites import composite, picture
+from tests.core.segment.encoded import dino, embedding
 from tests.core.segment.simulated_user import Step, around, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
@@ -28,20 +28,6 @@ BAD = 0.75  # IoU below which a mask is not what was meant
 FEW = ("astronaut", "coffee", "dahlia", "spoon")
 RANDOM_CLICKS = 6
 LATENCY = 0.3  # x the time of encoding: a click's, once the photo is encoded
-
-
-@cache
-def dino() -> segment.Segmenter:
-    backend = segment.load("dino")
-    for reason in (backend.missing(), segment.load("subject").missing()):
-        if reason is not None:
-            pytest.skip(reason)
-    return backend
-
-
-@cache
-def embedding(name: str) -> Any:
-    return dino().encode(photo(name), silent)
 
 
 def select(name: str, *clicks: tuple, level: str = "object") -> np.ndarray:

@@ -15,6 +15,7 @@ from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.segment import SelectionError
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import SKETCH, ellipses, overlap, prompt
+from tests.core.segment.encoded import dino, embedding
 from tests.photos import photo
 from tests.tree import quick
 
@@ -63,27 +64,10 @@ def is_trained() -> bool:
     return True
 
 
-@pytest.fixture(scope="module")
-def dino():
-    """The learned backend with both of its networks."""
-    for name in ("dino", "subject"):
-        reason = segment.load(name).missing()
-        if reason is not None:
-            pytest.skip(reason)
-    return loaded("dino")
-
-
-@pytest.fixture(scope="module")
-def embeddings(dino):
-    """photo name -> embedding, computed once."""
-    kept: dict[str, object] = {}
-
-    def embedding(name: str):
-        if name not in kept:
-            kept[name] = dino.encode(photo(name), silent)
-        return kept[name]
-
-    return embedding
+@pytest.fixture(scope="module", name="dino")
+def _dino() -> segment.Segmenter:
+    """The learned backend; the test is skipped without its networks."""
+    return dino()
 
 
 @pytest.mark.slow
@@ -147,23 +131,23 @@ def test_colours_alone_find_the_pagoda_in_its_box(china):
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow if n in LONG else ()) for n in OBJECTS]
 )
-def test_a_click_or_two_choose_the_whole_object(dino, embeddings, name):
+def test_a_click_or_two_choose_the_whole_object(dino, name):
     clicks, inside, outside = OBJECTS[name]
-    mask = dino.segment(photo(name), prompt(clicks), embeddings(name), silent)
+    mask = dino.segment(photo(name), prompt(clicks), embedding(name), silent)
     assert [(x, y) for x, y in inside if not mask[y, x]] == []
     assert [(x, y) for x, y in outside if mask[y, x]] == []
     count, _ = cv2.connectedComponents(mask.astype(np.uint8))
     assert count == 2  # one piece, and the background
 
 
-def test_the_cup_stands_on_its_saucer(dino, embeddings, coffee):
-    mask = dino.segment(coffee, prompt([(300, 130)]), embeddings("coffee"), silent)
+def test_the_cup_stands_on_its_saucer(dino, coffee):
+    mask = dino.segment(coffee, prompt([(300, 130)]), embedding("coffee"), silent)
     drawn = ellipses(coffee.shape, (279, 214, 201, 175), (291, 105, 117, 88))
     assert overlap(mask, drawn) > SKETCH
 
 
-def test_outlines_are_smooth(dino, embeddings, coffee):
-    mask = dino.segment(coffee, prompt([(300, 130)]), embeddings("coffee"), silent)
+def test_outlines_are_smooth(dino, coffee):
+    mask = dino.segment(coffee, prompt([(300, 130)]), embedding("coffee"), silent)
     smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 4) > 0.5
 
     def length(image: np.ndarray) -> float:
@@ -175,45 +159,45 @@ def test_outlines_are_smooth(dino, embeddings, coffee):
     assert length(mask) < RAGGED * length(smooth)
 
 
-def test_any_click_on_the_astronaut_chooses_the_astronaut(dino, embeddings, astronaut):
+def test_any_click_on_the_astronaut_chooses_the_astronaut(dino, astronaut):
     masks = [
-        dino.segment(astronaut, prompt([at]), embeddings("astronaut"), silent)
+        dino.segment(astronaut, prompt([at]), embedding("astronaut"), silent)
         for at in [(220, 80), (180, 440), (150, 400)]
     ]
     assert min(overlap(masks[0], mask) for mask in masks[1:]) > RESIZED
 
 
-def test_a_negative_click_takes_away_just_the_helmet(dino, embeddings, astronaut):
-    whole = dino.segment(astronaut, prompt([(220, 80)]), embeddings("astronaut"), silent)
+def test_a_negative_click_takes_away_just_the_helmet(dino, astronaut):
+    whole = dino.segment(astronaut, prompt([(220, 80)]), embedding("astronaut"), silent)
     asked = prompt([(220, 80), (400, 430, False)])
-    without = dino.segment(astronaut, asked, embeddings("astronaut"), silent)
+    without = dino.segment(astronaut, asked, embedding("astronaut"), silent)
     assert not (without & ~whole).sum() > 0.01 * whole.sum()
     gone = whole & ~without
     assert overlap(gone, ellipses(astronaut.shape, (390, 440, 112, 96))) > 0.8  # cut by the frame
 
 
 @pytest.mark.slow
-def test_a_second_positive_click_adds_what_it_is_on(dino, embeddings, chelsea):
+def test_a_second_positive_click_adds_what_it_is_on(dino, chelsea):
     head = [(250, 150), (40, 270, False)]
-    first = dino.segment(chelsea, prompt(head), embeddings("chelsea"), silent)
+    first = dino.segment(chelsea, prompt(head), embedding("chelsea"), silent)
     asked = prompt([(250, 150), (40, 270)])
-    second = dino.segment(chelsea, asked, embeddings("chelsea"), silent)
+    second = dino.segment(chelsea, asked, embedding("chelsea"), silent)
     assert not first[270, 40]
     assert second[270, 40]
     assert (first & ~second).sum() < 0.01 * first.sum()
 
 
-def test_the_subject_needs_no_click(dino, embeddings, coffee):
-    mask = dino.segment(coffee, Prompt(is_subject=True), embeddings("coffee"), silent)
-    clicked = dino.segment(coffee, prompt([(300, 130)]), embeddings("coffee"), silent)
+def test_the_subject_needs_no_click(dino, coffee):
+    mask = dino.segment(coffee, Prompt(is_subject=True), embedding("coffee"), silent)
+    clicked = dino.segment(coffee, prompt([(300, 130)]), embedding("coffee"), silent)
     assert overlap(mask, clicked) > RESIZED
     alone = segment.load("subject").segment(coffee, Prompt(is_subject=True), None, silent)
     assert overlap(alone, clicked) > RESIZED
 
 
 @pytest.mark.slow
-def test_the_same_photo_at_twice_the_size_gives_the_same_object(dino, embeddings, coffee):
-    small = dino.segment(coffee, prompt([(300, 130)]), embeddings("coffee"), silent)
+def test_the_same_photo_at_twice_the_size_gives_the_same_object(dino, coffee):
+    small = dino.segment(coffee, prompt([(300, 130)]), embedding("coffee"), silent)
     double = cv2.resize(coffee, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
     large = dino.segment(double, prompt([(600, 260)]), None, silent)
     shrunk = cv2.resize(large.astype(np.uint8), small.shape[::-1], interpolation=cv2.INTER_AREA)
