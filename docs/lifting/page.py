@@ -66,8 +66,9 @@ and shift; seen from eight sides each. *inflation* is the relief without looking
 OUTLINES = """## Outlines and newly shown sides
 
 The product alone, on the ten and on ten further solids (`HELD_OUT` in `solids.py`). Nothing was
-chosen on those but for plate and cup, which were looked at while rims and lips were made. Means
-over both directions of a turn; `make_lifting.py quick NAME ...` prints each turn of one.
+chosen on those but for plate and cup, which were looked at while rims and lips were made; the
+lamp's numbers were seen once while free forms were closed at their outline. Means over both
+directions of a turn; `make_lifting.py quick NAME ...` prints each turn of one.
 
 - **Wobble**: the total absolute curvature of the outline over the true one's (evenly resampled,
   smoothed by 1 % of the square root of the area, without the frame). 1 bends as the truth does.
@@ -111,12 +112,12 @@ Each picture was looked at. Up to 25 degrees the flower, the rocket, the bowl, t
 logo look right, the astronaut and the coffee nearly so: her head is a little deep, and what is not
 shown of hair and collar is plain; the coffee's handle and spoon lie flat on the saucer, the upper
 end of the spoon's bowl is smeared where it covers the cup, and what turns into view of the cup's
-side is blurred. The horse is a sheet, as it was drawn. What does not look right: from 25 degrees on
-a band along the cheek of the cat, whose outline is wavy there; the fig in the bowl becomes narrow,
-and slides at 35; the photographer's back has a grey band; the clock, which is blurred, has a double
-edge; the retina and the colour ball, which fill their photos, get corners; the pagoda is selected
-in part, and leans; of the moon and of the cell a piece of ground is selected, which has a ragged
-edge.
+side is blurred. The horse is a sheet, as it was drawn. What does not look right: the invented fur
+along the cat's cheek is a little darker than the fur beside it, and that at the upper left is
+coarse; the fig in the bowl becomes narrow, and slides at 35; the photographer's back has a grey
+band; the clock, which is blurred, has a double edge; the retina and the colour ball, which fill
+their photos, get corners; the pagoda is selected in part, and leans; of the moon and of the cell a
+piece of ground is selected, which has a ragged edge.
 """
 STEREO = """## A photographed thing whose shape is known
 
