@@ -23,7 +23,7 @@ from .silhouette import ReliefSilhouette
 # The outlines of a silhouette as lines, along which a surface has its rim.
 
 SHORTEST = 4  # cells of a rim that is looked at
-STAIRS, CORNERS = 4.0, 1.25  # cells, over which an outline's staircase is evened, and at corners
+STAIRS, CORNERS = 4.0, 1.0  # cells, over which an outline's staircase is evened, and at corners
 STAIR = 0.35  # cells: what evening moves by more is no stair
 
 
