@@ -232,13 +232,13 @@ def _option(
     default: Any, values: Values, where: tuple[str, str], placeholder: str | None, help: str
 ) -> Any:
     part, heading = where
-    told = Option(values, part, heading, placeholder, help)
-    return field(default=default, metadata={"option": told})
+    option = Option(values, part, heading, placeholder, help)
+    return field(default=default, metadata={"option": option})
 
 
 _CHOOSING, _SHAPE, _FINISH = (CHOOSING, OBJECT), (SHAPE, LOOK), (FINISH, LOOK)
 _POSE, _DEFORMING, _PLACED = (POSE, DEFORMING), (OTHER, DEFORMING), (POSE, PLACING)
-_FRONTS = (PHOTO, PLACING)
+_WHOLE = (PHOTO, PLACING)
 
 
 @dataclass(frozen=True)
@@ -377,7 +377,7 @@ class EditScript:
     )  # fmt: skip
     scale: float | None = _option(None, NUMBER, _PLACED, "S", "scale factor")
     key: tuple[EditScript, ...] = _option(
-        (), KEYS, _FRONTS, "POSE",
+        (), KEYS, _WHOLE, "POSE",
         "a further pose for --video keys, such as 'turn=-20 handle=X,Y:X2,Y2'",
     )  # fmt: skip
     shadow: str = _option(
@@ -388,10 +388,10 @@ class EditScript:
         False, FLAG, (OTHER, PLACING), None, "take the object away and show what is behind it"
     )
     front: tuple[XY, ...] = _option(
-        (), POINTS, _FRONTS, "X,Y", "on something that stays in front of the object"
+        (), POINTS, _WHOLE, "X,Y", "on something that stays in front of the object"
     )
     front_mask: str | None = _option(
-        None, TEXT, _FRONTS, "M.png", "a mask of something that stays in front"
+        None, TEXT, _WHOLE, "M.png", "a mask of something that stays in front"
     )
 
     def merged(self, other: EditScript, said: Iterable[str]) -> EditScript:

@@ -139,20 +139,20 @@ def window_options(options: argparse.Namespace) -> WindowOptions:
 
 
 def _add_options(parser: argparse.ArgumentParser, *headings: str) -> None:
-    """The options of an edit that stand below these headings, or all."""
+    """Add the options of an edit that stand below these headings; all, where none is given."""
     groups: dict[str, argparse._ArgumentGroup] = {}
     for name, option in OPTIONS.items():
         if headings and option.heading not in headings:
             continue
         if option.heading not in groups:
             groups[option.heading] = parser.add_argument_group(option.heading)
-        shape = {} if option.placeholder is None else {"metavar": option.placeholder}
+        written = {} if option.placeholder is None else {"metavar": option.placeholder}
         flag = f"--{name.replace('_', '-')}"
-        groups[option.heading].add_argument(flag, help=option.help, **shape, **_reading(option))
+        groups[option.heading].add_argument(flag, help=option.help, **written, **_reading(option))
 
 
 def _reading(option: Option) -> dict[str, Any]:
-    """How argparse reads the values of an option; what is not said there is None."""
+    """Return how argparse reads the values of an option. One that is not given is None."""
     several = {"points": _list(2, 2), "handles": _handle, "sources": _fill_from, "keys": _key}
     one = {"number": float, "whole": int, "numbers": _list(*option.values.counts)}
     kind = option.values.kind
