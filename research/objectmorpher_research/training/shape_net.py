@@ -89,7 +89,7 @@ class ShapeNet(nn.Module):
         y = self.up3(torch.cat([_doubled(y), x3, _resized(self.tokens_fine(tokens), x3)], 1))
         y = self.up2(torch.cat([_doubled(y), x2], 1))
         y = self.up1(torch.cat([_doubled(y), x1], 1))
-        with torch.autocast("cpu", enabled=False):  # eight bits are too few for a depth
+        with torch.autocast(y.device.type, enabled=False):  # eight bits are too few for a depth
             if phase is None:
                 raw = F.pixel_shuffle(self.head(y.float()), 2)
             else:
