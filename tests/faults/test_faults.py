@@ -60,4 +60,4 @@ def test_every_fault_at_the_operations_of_all_that_is_written() -> None:
 
 @pytest.mark.slow
 def test_power_cuts_of_all_that_is_written() -> None:
-    assert_none_lost(run("--power"), 10)
+    assert_none_lost(run("--power", "--states", "64"), 10)
