@@ -1,13 +1,16 @@
 """The wheel by `pipx install` and by `uv tool install`, each into a folder of its own, and an edit.
 
-    python packaging/check_tools.py [FOLDER]      in an environment with hatchling
+    python packaging/check_tools.py [--compiled] [FOLDER]      in an environment with hatchling
 
-The tools themselves are installed into FOLDER, too (a temporary one by default).
+The tools themselves are installed into FOLDER, too (a temporary one by default). `--compiled`: the
+edit takes the checkout's kernels, where there are any; it compiles its own otherwise.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -31,7 +34,21 @@ def run(*command: object, cwd: Path, **more: str) -> str:
     return done.stdout
 
 
-def check(folder: Path, tool: str) -> tuple[float, float]:
+def bring_kernels(packages: Path) -> None:
+    """Copies what numba has compiled of the checkout to an installed wheel's `packages`.
+
+    The sources there are the same; their times become so, too, by which older numbas go.
+    """
+    for above, name in ((ROOT, "objectmorpher_core"), (ROOT / "app", "objectmorpher")):
+        for kernel in (above / name).rglob("__pycache__/*.nb[ic]"):
+            there = packages / kernel.relative_to(above)
+            there.parent.mkdir(exist_ok=True)
+            shutil.copy(kernel, there)
+        for source in (above / name).rglob("*.py"):
+            shutil.copystat(source, packages / source.relative_to(above))
+
+
+def check(folder: Path, tool: str, is_compiled: bool) -> tuple[float, float]:
     """Seconds that the installation took, and the first edit."""
     for own in ("home", "bin", "cache"):
         (folder / tool / own).mkdir(parents=True)
@@ -57,6 +74,8 @@ def check(folder: Path, tool: str) -> tuple[float, float]:
     start = time.monotonic()
     run(*command, cwd=folder, **own)
     installed = time.monotonic() - start
+    if is_compiled:
+        bring_kernels(next((at / "home").rglob("objectmorpher_core")).parent)
     start = time.monotonic()
     assert run(program, "--version", cwd=folder).startswith("objectmorpher ")
     run(
@@ -71,8 +90,12 @@ def check(folder: Path, tool: str) -> tuple[float, float]:
 
 def main() -> None:
     """Checks both, and says how long each took."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER")
+    parser.add_argument("--compiled", action="store_true")
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(sys.argv[1] if len(sys.argv) > 1 else scratch).resolve()
+        folder = (options.folder or Path(scratch)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
         run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
         venv.create(folder / "tools", with_pip=True)
@@ -87,7 +110,7 @@ def main() -> None:
             cwd=folder,
         )
         for tool in ("pipx", "uv"):
-            installed, edited = check(folder, tool)
+            installed, edited = check(folder, tool, options.compiled)
             print(f"{tool}: installed in {installed:.0f} s, first edit after {edited:.0f} s more")
 
 

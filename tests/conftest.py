@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: ARCHITECTURE section 8
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # those of PyTorch wait busily for each other
 
 from objectmorpher_core.base.progress import silent
 from tests import photos
@@ -111,7 +112,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 LONG = (  # files and folders of which a test takes long: they begin
-    "tests/fuzz", "tests/faults", "tests/soak", "test_train", "core/segment", "test_autosave",
+    "tests/fuzz", "tests/faults", "tests/soak", "test_cli_truth", "test_documented", "test_warm_up",
+    "test_tools", "test_train", "core/segment", "test_autosave",
     "test_worker", "test_window", "test_first_use", "test_refin", "app/editing", "app/tools",
     "tests/app", "core/compose",
 )  # fmt: skip

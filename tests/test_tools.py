@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.slow
 def test_pipx_and_uv_install_what_edits(tmp_path) -> None:
     done = subprocess.run(
-        [sys.executable, ROOT / "packaging" / "check_tools.py", tmp_path],
+        [sys.executable, ROOT / "packaging" / "check_tools.py", "--compiled", tmp_path],
         capture_output=True, text=True,
     )  # fmt: skip
     if "Could not find a version" in done.stderr or "No matching distribution" in done.stderr:

@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "packaging"))
 
 import index_page  # noqa: E402
+from check_tools import bring_kernels  # noqa: E402
 
 READ_RESOURCES = """
 import sys
@@ -43,8 +44,8 @@ def run(*command: object, cwd: Path) -> str:
 def installed(tmp_path_factory) -> Path:
     """Folder of a fresh environment with the wheel in it; `bin` or `Scripts` holds its programs.
 
-    What the wheel depends on is seen through this environment's packages, so that the test takes
-    seconds; `.ci/run` installs everything anew.
+    What the wheel depends on is seen through this environment's packages, and its kernels are the
+    checkout's, so that the tests take seconds; `.ci/run` installs and compiles everything anew.
     """
     folder = tmp_path_factory.mktemp("wheel")
     run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
@@ -60,6 +61,7 @@ def installed(tmp_path_factory) -> Path:
     import numpy
 
     (Path(packages) / "dependencies.pth").write_text(str(Path(numpy.__file__).parents[1]))
+    bring_kernels(Path(packages))
     return programs
 
 

@@ -1,21 +1,25 @@
 """What users do first, each with a part of the program that compiles something.
 
-`python first_jobs.py FOLDER` does all of it in one process; `test_warm_up` looks at what numba
-has to compile then.
+`python first_jobs.py FOLDER` warms up and then does all of it in one process; it says, as JSON, how
+many kernels the warm-up looked for, and which others were asked for afterwards: `test_warm_up`.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 
 from objectmorpher.canvas.shape import build_shape, rehearse
+from objectmorpher.system.warm_up import warm_up
 from objectmorpher.worker import job_functions
 from objectmorpher.worker.job_functions import BackendChoice, Cut
+from objectmorpher_core.base import kernel_files
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.deform.puppet import Puppet
@@ -36,6 +40,21 @@ from tests.core.segment.truth_masks import truth_mask
 from tests.photos import photo
 
 COUNT = 12_000  # Gaussians: so many that a drag is drawn from fewer
+
+
+def asked_for() -> set[str]:
+    """Kernels, each with the types that it is called with, that numba looks for on the disk.
+
+    Those of the calls that come; where there is no such file yet, it is compiled.
+    """
+    names, load = set[str](), kernel_files.files.load
+
+    def noted(files: Any, key: Any) -> Any:
+        names.add(f"{files._index_name} {key[0]}")
+        return load(files, key)
+
+    kernel_files.files.load = noted
+    return names
 
 
 def import_everything(folder: Path) -> None:
@@ -99,5 +118,9 @@ def pose_in_all_ways(lifted: LiftedObject, camera: Camera) -> None:
 
 
 if __name__ == "__main__":
+    names = asked_for()
+    warm_up()
+    warm = set(names)
     import_everything(Path(sys.argv[1]))
     lift_and_repair()
+    print(json.dumps({"warm": len(warm), "others": sorted(names - warm)}))

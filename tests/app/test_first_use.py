@@ -1,4 +1,7 @@
-"""Somebody opens the editor for the first time and does what it says: a photo is edited."""
+"""Somebody opens the editor for the first time and does what it says: a photo is edited.
+
+Where the system lets it be seen, nothing has been asked of a network meanwhile.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from PIL import Image
 
 import first_use
 from hands import ROOT, Hands, opened
+from tests.faults import network
+from tests.faults.tracer import missing
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
 
@@ -36,13 +41,15 @@ def test_following_what_the_window_says_edits_a_photo(
 ) -> None:
     settings = Path(window_environment["OBJECTMORPHER_SETTINGS"])
     settings.write_text(f'{settings.read_text()}export_folder = "{tmp_path}"\n')
-    exported = tmp_path / "rocket-edited.jpg"
-    with opened(window_environment, None):
+    exported, out = tmp_path / "rocket-edited.jpg", tmp_path / "tried.jsonl"
+    watched = () if missing() else network.watcher(out)
+    with opened(window_environment, None, by=watched):
         hands = CountingHands(window_environment)
         for step in first_use.STEPS:
             hands.place(step.said)  # it waits until the window says so
             step.act(hands)
         hands.wait(exported.exists, "exporting")
+        assert not watched or network.tried(out) == []
     assert hands.presses == len(first_use.STEPS) <= MOST
     before = np.asarray(Image.open(ROOT / "assets/samples" / first_use.SAMPLE).convert("RGB"))
     after = np.asarray(Image.open(exported).convert("RGB"))

@@ -42,14 +42,14 @@ def main() -> int:
     logging.disable(logging.CRITICAL)  # settings that cannot be written are logged
     cv2.setNumThreads(1)
     is_wrong = False
-    for scenario in scenarios():
+    for shift, scenario in enumerate(scenarios()):
         chosen = options.scenarios.split(",") if options.scenarios else []
         if scenario.name not in chosen and (chosen or scenario.name in CARELESS):
             continue
         if options.power:
             result = cut_power(scenario, options.states)
         else:
-            result = inject(scenario, list(QUICK if options.quick else FAULTS), options.most)
+            result = inject(scenario, list(QUICK if options.quick else FAULTS), options.most, shift)
         is_wrong = is_wrong or bool(result.wrong)
         print(json.dumps(dataclasses.asdict(result)), flush=True)
     return int(is_wrong)

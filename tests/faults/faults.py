@@ -85,8 +85,13 @@ class Result:
     wrong: list[str] = field(default_factory=list)
 
 
-def inject(scenario: Scenario, faults: list[str], most: int | None = None) -> Result:
-    """Every fault at every operation of a scenario; of a long one at `most` so many, evenly."""
+def inject(
+    scenario: Scenario, faults: list[str], most: int | None = None, shift: int = 0
+) -> Result:
+    """Every fault at every operation of a scenario; of a long one at `most` so many, evenly.
+
+    `shift`: at others of them, so that scenarios that write alike have all of them together.
+    """
     result = Result(scenario.name)
     with tempfile.TemporaryDirectory() as scratch:
         bench = _Bench(scenario, Path(scratch))
@@ -96,7 +101,7 @@ def inject(scenario: Scenario, faults: list[str], most: int | None = None) -> Re
             result.wrong.append(f"without a fault: {clean.error or bench.state()}\n{clean.trace}")
             return result
         step = max(-(-result.operations // most), 1) if most else 1
-        for phase, fault in enumerate(faults):
+        for phase, fault in enumerate(faults, shift):
             for n, op in enumerate(clean.operations, 1):
                 if (n + phase) % step:  # of the next fault other operations
                     continue

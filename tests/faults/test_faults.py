@@ -11,7 +11,9 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-MOST = "20"  # operations of the one that has 178; `make faults` does all
+# Operations of each at which a fault comes; `make faults` does all. Seven scenarios write a file by
+# the same nine, and have every fault at each of these together.
+MOST = "8"
 
 
 def run(*options: str) -> list[dict[str, Any]]:
@@ -39,17 +41,16 @@ def test_power_cuts_leave_the_old_step_or_the_new_one() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("option", ["--quick", "--power"])
-def test_a_writer_that_takes_no_care_is_found_out(option: str) -> None:
+def test_a_writer_that_takes_no_care_is_found_out() -> None:
     """A file that is opened and written over: what the product must not do."""
-    (found,) = run(option, "--scenarios", "careless")
+    (found,) = run("--quick", "--scenarios", "careless")
     assert found["wrong"]
 
 
 @pytest.mark.slow
-def test_a_journal_whose_names_are_not_brought_to_the_disk_is_found_out() -> None:
-    (found,) = run("--power", "--scenarios", "careless order")
-    assert found["wrong"]
+def test_where_the_power_fails_it_is_found_out_and_a_journal_without_names_on_the_disk() -> None:
+    found = run("--power", "--scenarios", "careless,careless order")
+    assert [bool(result["wrong"]) for result in found] == [True, True]
 
 
 @pytest.mark.slow
@@ -59,4 +60,4 @@ def test_every_fault_at_the_operations_of_all_that_is_written() -> None:
 
 @pytest.mark.slow
 def test_power_cuts_of_all_that_is_written() -> None:
-    assert_none_lost(run("--power"), 10)
+    assert_none_lost(run("--power", "--states", "64"), 10)

@@ -32,6 +32,7 @@ F32 = 1e-4  # logits of two ways to the same network
 SUB_PIXEL = 0.02  # x logits' range: two ways of enlarging
 DISC = 0.96  # IoU; the network sees 3 to 6 px of the photo as one
 BF16 = 0.05  # x deviation of features: 8 bits of mantissa through a few layers
+ANSWERING = {"sam": 2, "sam2": 1, "sam3": 7}  # seeds whose answers are no specks, with torch 2.13
 
 
 def needs(*names: str) -> None:
@@ -57,7 +58,7 @@ def cache(tmp_path_factory):
     scope="module", params=[*quick(tiny_sams.FAMILIES, 1), *(f"onnx {n}" for n in LAYOUTS)]
 )
 def segmenter(request, cache, tmp_path_factory):
-    """A SAM of each family; of random weights the first whose answers are no specks."""
+    """A SAM of each family; of random weights some whose answers are no specks."""
     kind, _, layout = request.param.partition(" ")
     if kind == "onnx":
         needs("onnx")
@@ -66,7 +67,7 @@ def segmenter(request, cache, tmp_path_factory):
         )
         return segment.load("sam-onnx")
     needs_torch()
-    for seed in range(40):
+    for seed in (ANSWERING[kind], *range(40)):
         models.use_folder(kind, tiny_sams.write(kind, tmp_path_factory.mktemp(kind), seed))
         found = segment.load(kind)
         if answers(found):

@@ -221,7 +221,7 @@ def test_killed_and_called_again_it_has_the_same_losses(folder, weights):
     os.kill(process.pid, signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL
     assert (killed / FILE).is_file() and len(read_losses(killed)) < COURSE.steps
-    subprocess.run(command, check=True, env=os.environ | {"OMP_NUM_THREADS": "1"})
+    Trainer(made_up.places(folder, weights["qwen"], "killed"), PLAN).train(COURSE)
     found = read_losses(killed)
     for one, other in zip(found, expected, strict=True):
         assert one["step"] == other["step"] and one["loss"] == other["loss"]
@@ -248,10 +248,13 @@ def test_it_does_not_go_on_with_another_plan(folder, weights):
 def test_two_processes_have_the_gradients_of_one(folder, weights, tmp_path):
     from safetensors.torch import load_file
 
-    one, two = tmp_path / "one.safetensors", tmp_path / "two.safetensors"
-    run_gradients(folder, weights["qwen"], one, 1)
-    run_gradients(folder, weights["qwen"], two, 2)
-    alone, together = load_file(one), load_file(two)
+    trainer = Trainer(made_up.places(folder, weights["qwen"], "gradients"), PLAN)
+    loss = trainer.losses(range(5)).reshape(1)
+    grads = {name: p.grad for name, p in trainer.parameters.items() if p.grad is not None}
+    alone = {name: value.cpu() for name, value in (grads | {"loss": loss}).items()}
+    file = tmp_path / "two.safetensors"
+    run_gradients(folder, weights["qwen"], file)
+    together = load_file(file)
     assert alone.keys() == together.keys() and len(alone) > 10
     for name, value in alone.items():
         scale = max(float(value.abs().max()), 1e-8)
@@ -259,23 +262,21 @@ def test_two_processes_have_the_gradients_of_one(folder, weights, tmp_path):
     assert sum(float(v.abs().sum()) for v in alone.values()) > 0
 
 
-def run_gradients(folder: Path, weights: Path, file: Path, count: int) -> None:
-    """Over gloo, as `accelerate launch` starts processes."""
+def run_gradients(folder: Path, weights: Path, file: Path) -> None:
+    """Of two processes over gloo, as `accelerate launch` starts them."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
+    command = [sys.executable, str(PROGRAM), "gradients", str(folder), str(weights), str(file)]
     processes = []
-    for rank in range(count):
-        more = {"OMP_NUM_THREADS": "1", "ACCELERATE_USE_CPU": "true"}
-        if count > 1:
-            more |= {
-                "RANK": str(rank), "LOCAL_RANK": str(rank), "WORLD_SIZE": str(count),
-                "LOCAL_WORLD_SIZE": str(count), "MASTER_ADDR": "127.0.0.1",
-                "MASTER_PORT": str(port), "GLOO_SOCKET_IFNAME": "lo",
-            }  # fmt: skip
-        command = [sys.executable, str(PROGRAM), "gradients", str(folder), str(weights), str(file)]
+    for rank in range(2):
+        more = {
+            "OMP_NUM_THREADS": "1", "ACCELERATE_USE_CPU": "true", "RANK": str(rank),
+            "LOCAL_RANK": str(rank), "WORLD_SIZE": "2", "LOCAL_WORLD_SIZE": "2",
+            "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port), "GLOO_SOCKET_IFNAME": "lo",
+        }  # fmt: skip
         processes.append(subprocess.Popen(command, env=os.environ | more))
-    assert [process.wait(300) for process in processes] == [0] * count
+    assert [process.wait(300) for process in processes] == [0, 0]
 
 
 def test_order_and_noise_depend_on_seed_and_number_alone():
