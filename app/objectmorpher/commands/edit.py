@@ -78,12 +78,24 @@ def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
     return Command(tool.value, keys, lambda editor: editor.choose_tool(tool), why_not, is_on)
 
 
+def _copy_object(editor: Editor) -> None:
+    """Into the system's clipboard as a picture, and for other tabs as it is."""
+    editor.pasting.copy()
+    editor.exporting.copy(What.CUTOUT)
+
+
+def _nothing_copied(editor: Editor) -> str | None:
+    has_any = editor.pasting.has_copied
+    return no_photo(editor) or (None if has_any else t("Lift an object and copy it first"))
+
+
 COMMANDS: dict[str, Command] = {
     "undo": Command("Undo", "Ctrl+Z", lambda e: e.undo(), no_undo),
     "redo": Command("Redo", "Ctrl+Shift+Z", lambda e: e.redo(), no_redo, other_keys=("Ctrl+Y",)),
     "copy": Command("Copy photo", "Ctrl+C", lambda e: e.exporting.copy(What.PHOTO)),
-    "copy_object": Command(
-        "Copy object", "Ctrl+Shift+C", lambda e: e.exporting.copy(What.CUTOUT), no_selection
+    "copy_object": Command("Copy object", "Ctrl+Shift+C", _copy_object, no_selection),
+    "paste_object": Command(
+        "Paste object", "Ctrl+Shift+V", lambda e: e.pasting.paste(), _nothing_copied
     ),
     "paste": Command("Paste photo", "Ctrl+V", lambda e: e.filing.paste(), never),
     "select": _tool(ToolName.SELECT, "1", no_photo),

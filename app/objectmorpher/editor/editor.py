@@ -35,6 +35,7 @@ from .intents.masking import Masking
 from .intents.methods import Methods
 from .intents.models import Models
 from .intents.objects import Objects
+from .intents.pasting import Pasting
 from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
 from .intents.refining import RefiningIntents
@@ -84,6 +85,7 @@ class Editor(EditorState):
         self.leaving_out = LeavingOut(self)
         self.sample = SampleOpening(self, self.filing, self.selection, self.tasks)
         self.recovery = Recovery(self, self.tabs)
+        self.pasting = Pasting(self, self.objects, self.tabs)
         self._pollers = self._in_order()
         self._ask_elsewhere()
 

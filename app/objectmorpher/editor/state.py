@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.document import lock_edits
+from objectmorpher_core.document import lock_edits, visitor_edits
 from objectmorpher_core.document.model import Document, EditObject
 
 from ..canvas.derived import Derived
@@ -177,12 +177,23 @@ class EditorState:
             self.history.apply(label, document)
 
     def _is_refused(self, changed: Document) -> bool:
-        """Whether it changes a locked object, which is said."""
+        """Whether it changes a locked object, or the outline of a visitor, which is said."""
         before = self.committed
+        visitor = None if before is None else visitor_edits.changes_visitor(before, changed)
+        if visitor is not None:
+            self.say_visitor(visitor)
+            return True
         own = None if before is None else lock_edits.locked_change(before, changed)
         if before is not None and own is not None:
             self.say_locked(next(k for k, each in enumerate(before.objects) if each is own))
         return own is not None
+
+    def say_visitor(self, visitor: EditObject) -> None:
+        """That the outline and shape of an object of another photo are changed there."""
+        assert visitor.lifted is not None and visitor.lifted.origin is not None
+        photo = visitor.lifted.origin.photo
+        self.say(t("{name} comes from {photo}: change its outline there, and copy it again",
+                   name=visitor.name, photo=photo))  # fmt: skip
 
     def say_locked(self, k: int) -> None:
         """That object `k` is locked, with a button that unlocks it."""

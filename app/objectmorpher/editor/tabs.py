@@ -35,6 +35,7 @@ class Tabs:
         self._editor, self._posing, self._tasks = editor, posing, tasks
         self._start, self._leave = start, leave
         self.all: tuple[Tab, ...] = (editor.tab,)
+        self.aimed: Tab | None = None  # an object that is dragged would be let go on it
         self._ended: list[Autosave] = []  # of tabs that were closed
 
     @property

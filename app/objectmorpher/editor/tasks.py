@@ -318,7 +318,7 @@ class Tasks:
             return False
         # A fill is of these masks, and of the hints that are in force.
         wanted = (*(o.mask for o in document.objects), *document.hints)
-        if not any(o.lifted for o in document.objects):
+        if not any(o.lifted and not o.is_visitor for o in document.objects):
             return False
         if self._plate is not None and same(self._plate[0], wanted):
             self._add_plate(self._plate[1])

@@ -91,6 +91,31 @@ def light_gain(light: F32, width: int, before: Silhouette, now: Silhouette) -> G
     return r, g, b
 
 
+def light_around(light: F32, width: int, place: Silhouette) -> tuple[float, float, float] | None:
+    """Linear RGB of the background around a place; None where too little of it is seen."""
+    found = _around(light, width, place)
+    if found is None:
+        return None
+    r, g, b = found.mean.tolist()
+    return r, g, b
+
+
+def visitor_gain(
+    own: tuple[float, float, float] | None, now: tuple[float, float, float] | None
+) -> Gain:
+    """Return the factors of the colours of an object of another photo, at full strength.
+
+    `own` is the light around it there, `now` around where it is here. Two photos are two exposures
+    and two white balances: all of the difference counts, within the usual bounds.
+    """
+    if own is None or now is None:
+        return NEUTRAL
+    whole, ratio = _difference(np.array(own), np.array(now))
+    wanted = _beyond(whole, np.array(DEAD)) + COLOUR * _beyond(ratio, np.full(3, DEAD))
+    r, g, b = np.exp(np.clip(wanted, np.log(LEAST), np.log(MOST)) / GAMMA).tolist()
+    return r, g, b
+
+
 def _difference(old: F64, new: F64) -> tuple[np.ndarray, F64]:
     """Of luminance, and (3,) of each channel more than that: logarithms of linear light."""
     whole = np.log(max(new @ LUMINANCE, DARK) / max(old @ LUMINANCE, DARK))

@@ -70,7 +70,8 @@ MENUS: dict[str, tuple[str, ...]] = {
         "quit",
     ),
     "Edit": (
-        "undo", "redo", "-", "copy", "copy_object", "paste", "-", "select_handles",
+        "undo", "redo", "-", "copy", "copy_object", "paste", "paste_object", "-",
+        "select_handles",
         "remove_handle", "reset_handle", "reset_handles", "-", "reset_pose", "reset_place",
     ),
     "Select": (

@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from ...commands import COMMANDS, keys_of, run
 from ...editor.editor import Editor
 from ...editor.tab import Tab
+from ...editor.view import ToolName
 from ...system.texts import t
 from ..widgets.panes import TABS, edge, pane
 from ..widgets.theme import Icon, theme
@@ -26,7 +27,7 @@ BUTTON = 32.0  # points, of the button for a new tab
 
 def draw_tabs(editor: Editor, rect: Rect) -> None:
     """`rect` in window units."""
-    tabs = editor.tabs.all
+    tabs, editor.tabs.aimed = editor.tabs.all, None
     with pane(TABS, rect, padding=(0, 0)):
         width = min((rect.width - theme.pt(BUTTON)) / len(tabs), theme.pt(WIDEST))
         low = rect.y + rect.height - 0.5
@@ -47,11 +48,15 @@ def _draw_tab(editor: Editor, tab: Tab, rect: Rect) -> None:
     name, is_shown = tab.name or t("New tab"), tab is editor.tab
     start, end = ImVec2(rect.x, rect.y), ImVec2(rect.x + rect.width, rect.y + rect.height)
     is_near = imgui.is_mouse_hovering_rect(start, end)
+    if is_near and not is_shown and tab.document is not None and _is_object_dragged(editor):
+        editor.tabs.aimed = tab
     has_cross = is_shown or rect.width >= theme.pt(NARROW)
     beside = theme.pt(CROSS) if has_cross else 0.0
     draw = imgui.get_window_draw_list()
     if is_shown or is_near:  # the tab that is shown goes over into the picture below it
         draw.add_rect_filled(start, end, theme.u32("surround" if is_shown else "hovered"))
+    if tab is editor.tabs.aimed:
+        draw.add_rect(start, end, theme.u32("accent"), thickness=theme.pt(2))
     if is_shown:
         high = ImVec2(end.x, start.y + theme.pt(2))
         draw.add_rect_filled(start, high, theme.u32("accent"))
@@ -78,6 +83,12 @@ def _draw_tab(editor: Editor, tab: Tab, rect: Rect) -> None:
             _draw_cross(editor, tab, at)
     else:
         draw.add_circle_filled(at, theme.pt(DOT), theme.u32("accent"))
+
+
+def _is_object_dragged(editor: Editor) -> bool:
+    """Whether the whole object is being moved, so that it can be dropped on a tab."""
+    is_dragging = editor.hand.is_busy and editor.preview is not None
+    return is_dragging and editor.view.tool is ToolName.PLACE and editor.hover.part == "move"
 
 
 def _draw_cross(editor: Editor, tab: Tab, at: ImVec2) -> None:

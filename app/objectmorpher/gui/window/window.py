@@ -286,6 +286,8 @@ class Window:
         io.config_drag_click_to_input_text = True
         io.mouse_double_click_time = DOUBLE_CLICK
         io.config_flags |= imgui.ConfigFlags_.no_mouse_cursor_change
+        context = imgui.get_current_context()  # Ctrl+Tab is between photos, not ImGui's windows
+        context.config_nav_windowing_key_next = context.config_nav_windowing_key_prev = 0
         looks.load_fonts()
         take_key: Any = self._take_key
         take_character: Any = self._take_character
