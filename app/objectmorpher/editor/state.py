@@ -190,10 +190,13 @@ class EditorState:
 
     def say_visitor(self, visitor: EditObject) -> None:
         """That the outline and shape of an object of another photo are changed there."""
-        assert visitor.lifted is not None and visitor.lifted.origin is not None
-        photo = visitor.lifted.origin.photo
-        self.say(t("{name} comes from {photo}: change its outline there, and copy it again",
-                   name=visitor.name, photo=photo))  # fmt: skip
+        self.say(_of_elsewhere(visitor))
+
+    @property
+    def visitor_note(self) -> str | None:
+        """The same of the current object; None of one of this photo."""
+        own = self.object
+        return _of_elsewhere(own) if own is not None and own.is_visitor else None
 
     def say_locked(self, k: int) -> None:
         """That object `k` is locked, with a button that unlocks it."""
@@ -218,3 +221,10 @@ class EditorState:
         preview, self.preview = self.preview, None
         if preview is not None and label:
             self.apply(label, preview)
+
+
+def _of_elsewhere(visitor: EditObject) -> str:
+    assert visitor.lifted is not None and visitor.lifted.origin is not None
+    photo = visitor.lifted.origin.photo
+    return t("{name} comes from {photo}: change its outline there, and copy it again",
+             name=visitor.name, photo=photo)  # fmt: skip
