@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return cli.main(arguments) if is_question else _run_command(arguments)
     options = cli.parse_window(arguments)
     if not has_display():
-        return _edit_headless(options.file)
+        return _edit_headless(next(iter(options.files), None))
     return _run_window(cli.window_options(options))
 
 

@@ -48,6 +48,7 @@ from .shadow.shadow import Shade
 
 STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
 OPAQUE = 1 - STILL_ALPHA
+ELSEWHERE = 1e6  # px by which an object of another photo has moved, wherever it is
 PIECE = 2 * TILE  # rows that a thread works on: what it computes stays in the processor's cache
 
 
@@ -346,6 +347,8 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
     if not thing.has_hole:
         rest = np.zeros_like(rest)
     inner = slice(y0 - top, y1 - top)
+    if thing.item.is_visitor:  # nothing of it was ever there
+        around = replace(around, shift=np.full_like(around.shift, ELSEWHERE))
     moved = displacement(around, rest)[inner]
     picture = _part(around, inner.start, inner.stop)
     through = 1 - picture.alpha

@@ -126,6 +126,8 @@ def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) ->
 def leaves_a_hole(objects: tuple[EditObject, ...], k: int) -> bool:
     """Whether nothing stands where object `k` was in the photo: no copy of it at rest."""
     item = objects[k]
+    if item.is_visitor:
+        return False
     return not any(_rests(other, item) for i, other in enumerate(objects) if i != k)
 
 

@@ -130,7 +130,8 @@ class Puppet:
         texture = lifted.texture
         pieces = lifted.world_points(split.gaussians.means)
         whole = lifted.world_points(lifted.gaussians.means)[parents]
-        u0 = texture.u0[parents] + (self.camera.project(pieces) - self.camera.project(whole))
+        camera = self._rest.camera
+        u0 = texture.u0[parents] + (camera.project(pieces) - camera.project(whole))
         sides = None if lifted.sides is None else lifted.sides.select(parents).moved(pieces - whole)
         own = PhotoTexture(u0, texture.visibility[parents], texture.solidity[parents])
         return replace(lifted, gaussians=split.gaussians, texture=own, sides=sides)

@@ -59,7 +59,7 @@ def remove_object(document: Document, k: int) -> Document:
     objects = tuple(o for i, o in enumerate(document.objects) if i != k)
     mask = document.objects[k].mask
     is_copy = mask is not None and any(other.mask is mask for other in objects)
-    plate = document.plate if is_copy else None
+    plate = document.plate if is_copy or document.objects[k].is_visitor else None
     return replace(document, objects=objects, plate=plate, refined=None)
 
 
@@ -407,11 +407,11 @@ def duplicate(document: Document, k: int) -> Document:
     item = document.objects[k]
     if item.lifted is None:
         raise EditError("lift the object before making a copy of it")
-    copy = replace(item, name=_free_name(item.name, {o.name for o in document.objects}))
+    copy = replace(item, name=free_name(item.name, {o.name for o in document.objects}))
     return replace(document, objects=(*document.objects, copy), refined=None)
 
 
-def _free_name(name: str, taken: set[str]) -> str:
+def free_name(name: str, taken: set[str]) -> str:
     """ "Cat 2", or the next number that nobody has."""
     stem, _, last = name.rpartition(" ")
     stem = stem if stem and last.isdigit() else name

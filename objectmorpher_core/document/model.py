@@ -174,6 +174,15 @@ class Sides:
         return replace(self, at=at, slopes=slopes)
 
 
+@dataclass(frozen=True)
+class Origin:
+    """The other photo that an object comes from: what of it has to be known where it is now."""
+
+    photo: str  # file name without folder
+    camera: Camera  # in whose frame the object was lifted; it carries that photo, by those px
+    light: tuple[float, float, float] | None = None  # linear RGB around it; None: not known
+
+
 GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape
 
 
@@ -236,6 +245,7 @@ class LiftedObject:
     doubt: float = 0.0
     stands: bool = False  # whether it was seen to stand on something
     sides: Sides | None = None  # invented; None: what the photo does not show has plain colours
+    origin: Origin | None = None  # None: the document's own photo
 
     def __post_init__(self) -> None:
         if self.middle is not None:
@@ -403,11 +413,16 @@ class EditObject:
         return self.base
 
     @property
+    def is_visitor(self) -> bool:
+        """Whether it comes from another photo; its mask is empty then."""
+        return self.lifted is not None and self.lifted.origin is not None
+
+    @property
     def is_moved(self) -> bool:
         """Whether the object is anywhere else than in the photo, or looks otherwise."""
         return self.lifted is not None and (
-            self.pose is not None or not self.placement.is_identity or not self.is_visible
-            or self.finish != AS_IN_THE_PHOTO
+            self.is_visitor or self.pose is not None or not self.placement.is_identity
+            or not self.is_visible or self.finish != AS_IN_THE_PHOTO
         )  # fmt: skip
 
     @property

@@ -40,8 +40,9 @@ class RestSplats:
     """A lifted object in the photo, with everything that does not depend on its motion."""
 
     def __init__(self, lifted: LiftedObject, camera: Camera) -> None:
-        """`camera` is the photo's."""
+        """`camera` is the photo's, unless the object brings its own."""
         self.lifted = lifted
+        self.camera = camera = camera if lifted.origin is None else lifted.origin.camera
         self.splatting: Splatting = SPLATTINGS[lifted.splatting]
         self.world_from_object = lifted.world_from_object
         self.means = frozen(lifted.gaussians.means, np.float64)  # (N, 3) object frame
@@ -54,6 +55,10 @@ class RestSplats:
 
     def __len__(self) -> int:
         return len(self.means)
+
+    def carried(self, photo_camera: Camera) -> Camera:
+        """Return the camera of the photo that the object carries, by default the document's."""
+        return photo_camera if self.lifted.origin is None else self.camera
 
     @cached_property
     def is_textured(self) -> bool:

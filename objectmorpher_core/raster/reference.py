@@ -185,6 +185,7 @@ def render(
     splats: PosedSplats, texture: TextureLevels, camera: Camera, photo_camera: Camera
 ) -> Picture3D:
     """The object as `camera` sees it. `camera` gives the size of the picture."""
+    photo_camera = splats.rest.carried(photo_camera)
     p = project(splats, camera, photo_camera)
     samples = [_sampled(p, i, splats, camera) for i in range(len(p.depth))]
     there = [(i, s) for i, s in enumerate(samples) if s is not None]

@@ -54,6 +54,7 @@ class Drawable:
 
 def prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
     """Projects the Gaussians, and sorts them where their order matters."""
+    photo_camera = splats.rest.carried(photo_camera)
     depths = None if splats.is_layered else np.empty(len(splats), np.float32)
     projected = frozen(project(splats, camera, photo_camera, depths))
     order = None if depths is None else depth_order(depths)

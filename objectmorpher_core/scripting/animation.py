@@ -68,7 +68,12 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
     matte, lifted, placement = item.matte, item.lifted, item.placement
     if lifted is not None:
         texture = replace(lifted.texture, u0=lifted.texture.u0 / np.float32(times))
-        lifted = replace(lifted, texture=texture, middle=None)
+        origin = lifted.origin
+        if origin is not None:
+            own = origin.camera
+            size = own.width // times, own.height // times
+            origin = replace(origin, camera=_camera(own, times, *size))
+        lifted = replace(lifted, texture=texture, middle=None, origin=origin)
     return replace(
         item, mask=mask, coverage=None, found=None, lifted=lifted,
         matte=None if matte is None else _matte(matte, times), mixed=None, contaminated=None,

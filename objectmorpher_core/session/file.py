@@ -24,7 +24,7 @@ import numpy as np
 
 from ..base.camera import Camera
 from ..base.files import OutputError, reason_of, write_all
-from ..base.limits import SESSION_DOCUMENT, SESSION_OBJECTS
+from ..base.limits import PICTURE_PIXELS, SESSION_DOCUMENT, SESSION_OBJECTS
 from ..base.quoting import named, shown
 from ..document.model import SELECTED, Document, EditObject, KeyPose, Photo
 from ..document.settings import LEAST_FEATHER, MOST_FEATHER
@@ -213,6 +213,7 @@ def build_document(
             f"the session is damaged: {len(objects):,} objects are more than {SESSION_OBJECTS}"
         )
     photo = _photo(tree.get("photo"), members, reader)
+    reader.most = max(reader.most, _most_carried(objects))
     try:
         document = _with_copies(reader.value(Document, tree | {"photo": photo}, "document"))
         _check(document)
@@ -264,6 +265,19 @@ def _photo(tree: object, members: Mapping[str, bytes], reader: TreeReader) -> Ph
     return Photo(picture, camera, source, reader.value(str, tree.get("name"), "photo.name"))
 
 
+def _most_carried(objects: object) -> int:
+    """Px of the largest other photo that objects say they come from: they may be as large."""
+    most = 0
+    for item in objects if isinstance(objects, list) else ():
+        for name in ("lifted", "origin", "camera"):
+            item = item.get(name) if isinstance(item, dict) else None
+        if isinstance(item, dict):
+            width, height = item.get("width"), item.get("height")
+            if isinstance(width, int) and isinstance(height, int) and min(width, height) > 0:
+                most = max(most, min(width * height, PICTURE_PIXELS))
+    return most
+
+
 def _with_copies(document: Document) -> Document:
     """Copies of an object share its mask, by which they are known as copies."""
     known: dict[bytes, np.ndarray] = {}
@@ -292,7 +306,7 @@ def _check(document: Document) -> None:
             _same("an edge's colours", item.contaminated.shape, item.matte.foreground.shape)
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
-            _near("matte", item.matte.box, (width, height))
+            _near("matte", item.matte.box, _size_around(item, (width, height)))
         _check_lifted(item)
     if document.horizon is not None and abs(document.horizon) > MAX_HORIZON * height:
         raise ValueError(f"a horizon at {document.horizon:g} px is far outside the photo")
@@ -362,6 +376,19 @@ def _check_lifted(item: EditObject) -> None:
         _check_posed(state, nodes)
     for key in item.keys:
         replace(item.rig, held=key.held, shifts=key.shifts).check(nodes)
+
+
+def _size_around(item: EditObject, size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height px of the photo that an object was cut out of. ValueError for nonsense."""
+    if item.lifted is None or (origin := item.lifted.origin) is None:
+        return size
+    own = origin.camera
+    numbers = (own.focal, own.cx, own.cy, *(origin.light or ()))
+    if not np.isfinite(numbers).all() or own.focal <= 0 or min(own.width, own.height) < 1:
+        raise ValueError("the camera of an object of another photo makes no sense")
+    if min(origin.light or (0.0,)) < 0:
+        raise ValueError("the light around an object of another photo is negative")
+    return own.width, own.height
 
 
 def _check_posed(state: EditObject | KeyPose, nodes: int) -> None:

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 import hands
-from editor_steps import lift_ball, made_photo, open_file, wait_until
+from editor_steps import close_all, lift_ball, made_photo, open_file, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
 from objectmorpher.editor.view import ViewState
@@ -68,7 +68,7 @@ def editor(request: pytest.FixtureRequest, shared_editor: Editor, photo_path: Pa
     A test that has the lifted `ball` opens that: for it nothing is opened, and what the canvas has
     computed of the ball stays known.
     """
-    shared_editor.close_document()
+    close_all(shared_editor)
     wait_until(shared_editor, lambda: shared_editor.jobs.is_idle)
     shared_editor.view = ViewState()  # nothing of it stays from the test before
     shared_editor.view.resize(*CANVAS)
@@ -85,7 +85,7 @@ def ball(
     """The made photo's document, its ball lifted and with a background behind it."""
     path = tmp_path_factory.mktemp("ball") / "ball.png"
     path.write_bytes(photo_bytes)
-    shared_editor.close_document()
+    close_all(shared_editor)
     open_file(shared_editor, path)
     return lift_ball(shared_editor)
 

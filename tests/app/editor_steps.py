@@ -34,9 +34,17 @@ def made_photo() -> np.ndarray:
 
 
 def open_file(editor: Editor, path: Path) -> None:
-    """Opens it and waits for it, or for the question about unsaved changes."""
+    """Opens it and waits for it."""
     editor.filing.open(path)
     wait_until(editor, lambda: editor.chores.is_idle)
+
+
+def close_all(editor: Editor) -> None:
+    """Leaves one tab with the start screen; nothing is asked."""
+    for tab in editor.tabs.all:
+        if tab is not editor.tab:
+            editor.tabs.close(tab)
+    editor.close_document()
 
 
 def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:

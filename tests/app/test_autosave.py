@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from edit_until_killed import base_document, step_document
-from editor_steps import wait_until
+from editor_steps import close_all, wait_until
 from hands import ROOT
 from objectmorpher.editor.autosave import recovery_root
 from objectmorpher.editor.editor import Editor
@@ -43,11 +43,11 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def editor(root: Path, shared_editor: Editor) -> Iterator[Editor]:
     """An editor that shows noise; nothing is unsaved before and after."""
-    shared_editor.close_document()
+    close_all(shared_editor)
     settle(shared_editor)
     shared_editor.start(base_document())
     yield shared_editor
-    shared_editor.close_document()
+    close_all(shared_editor)
     settle(shared_editor)
 
 

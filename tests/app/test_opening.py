@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from editor_steps import CENTRE, open_file, wait_for_jobs, wait_until
+from editor_steps import CENTRE, close_all, open_file, wait_for_jobs, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.opening import THUMB, read_thumbnail
 from objectmorpher.editor.recovery import Left
@@ -38,7 +38,7 @@ MEGAPIXELS = (6000, 4000)
 def editor(shared_editor: Editor, photo_path: Path) -> Iterator[Editor]:
     """With the made photo open, and the segmenter that reads a photo at once."""
     settings = shared_editor.settings
-    shared_editor.close_document()
+    close_all(shared_editor)
     shared_editor.settings = replace(settings, backends=Backends(segment="grabcut"))
     open_file(shared_editor, photo_path)
     yield shared_editor
@@ -90,12 +90,12 @@ def test_what_was_asked_last_is_opened(editor: Editor, tmp_path: Path, photo_byt
     assert editor.source == other
 
 
-def test_what_is_done_while_a_file_is_read_is_asked_about(
+def test_what_is_done_while_a_file_is_read_stays_in_its_tab(
     editor: Editor, tmp_path: Path, photo_bytes: bytes
 ) -> None:
     editor.selection.add_click(*CENTRE, True)
     wait_for_jobs(editor)
-    edited = editor.committed
+    edited, tab = editor.committed, editor.tab
     assert edited is not None
     editor.undo()
     other = tmp_path / "other.png"
@@ -103,10 +103,8 @@ def test_what_is_done_while_a_file_is_read_is_asked_about(
     editor.filing.open(other)
     editor.redo()
     wait_for_file(editor)
-    assert editor.committed is edited
-    assert editor.filing.question is not None
-    editor.filing.answer_discard()
-    assert editor.source == other
+    assert editor.source == other and editor.filing.question is None
+    assert tab.document is edited and not tab.is_saved
 
 
 def test_closing_forgets_the_file_that_is_read(editor: Editor, photo_path: Path) -> None:
@@ -116,17 +114,20 @@ def test_closing_forgets_the_file_that_is_read(editor: Editor, photo_path: Path)
     assert editor.document is None
 
 
-def test_of_several_dropped_files_the_first_photo_is_opened(
+def test_of_several_dropped_files_each_photo_is_opened_in_a_tab(
     editor: Editor, tmp_path: Path, photo_bytes: bytes
 ) -> None:
-    names = ("notes.txt", "cat.ply", "second.png", "third.png")
+    names = ("notes.txt", "cat.ply", "second.png", "broken.png", "third.png")
     for name in names:
-        (tmp_path / name).write_bytes(photo_bytes)
+        (tmp_path / name).write_bytes(photo_bytes if name != "broken.png" else b"no picture")
     editor.filing.drop([tmp_path / name for name in names])
     wait_for_file(editor)
-    assert editor.source == tmp_path / "second.png"
+    assert [tab.name for tab in editor.tabs.all] == ["ball.png", "second.png", "third.png"]
+    assert editor.source == tmp_path / "third.png"
     assert editor.message is not None
-    assert editor.message.text == "Opened second.png; not opened: notes.txt, cat.ply, third.png"
+    assert editor.message.text == (
+        "Opened second.png, third.png; not opened: notes.txt, cat.ply, broken.png"
+    )
 
 
 def make(path: Path) -> None:
@@ -157,17 +158,6 @@ def test_what_cannot_be_opened_is_one_sentence(editor: Editor, tmp_path: Path, n
     assert editor.message is not None and editor.message.is_error
     assert name in editor.message.text.lower()
     assert "\n" not in editor.message.text and not editor.message.details
-
-
-def test_dropping_asks_about_unsaved_changes(editor: Editor, photo_path: Path) -> None:
-    editor.selection.add_click(*CENTRE, True)
-    wait_for_jobs(editor)
-    edited = editor.committed
-    editor.filing.drop([photo_path])
-    assert editor.filing.question is not None
-    editor.filing.answer_cancel()
-    wait_for_jobs(editor)
-    assert editor.committed is edited
 
 
 def test_a_killed_worker_is_a_sentence_with_retry_and_all_goes_on(editor: Editor) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from edit_until_killed import base_document, step_document
-from editor_steps import wait_until
+from editor_steps import close_all, wait_until
 from objectmorpher.editor.autosave import LOCK, FileLock, recovery_root
 from objectmorpher.editor.editor import Editor
 from objectmorpher_core.session.journal import DOCUMENT, Journal
@@ -20,11 +20,11 @@ def editor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_editor: Editor
 ) -> Iterator[Editor]:
     """With nothing open, and a data folder of its own."""
-    shared_editor.close_document()
+    close_all(shared_editor)
     settle(shared_editor)
     monkeypatch.setenv("OBJECTMORPHER_DATA", str(tmp_path / "data"))
     yield shared_editor
-    shared_editor.close_document()
+    close_all(shared_editor)
     settle(shared_editor)
 
 
@@ -113,13 +113,14 @@ def test_damage_is_a_sentence_and_the_rest_is_still_offered(editor: Editor, vict
     assert not broken.exists()
 
 
-def test_other_unsaved_work_is_asked_about_first(editor: Editor) -> None:
-    leave("cat", 9)
+def test_it_is_recovered_beside_other_unsaved_work(editor: Editor) -> None:
+    left = leave("cat", 9, step=7)
     base = base_document()
     editor.start(base)
     editor.apply("Step", step_document(base, 1))
     editor.recovery.look()
-    editor.recovery.recover(editor.recovery.left[0])
-    assert editor.filing.question is not None
-    editor.filing.answer_cancel()
-    assert editor.committed is not None and editor.committed.objects[0].placement.move[0] == 1.0
+    recover(editor, "cat")
+    assert [tab.document.objects[0].placement.move[0] for tab in editor.tabs.all if tab.document] \
+        == [1.0, 7.0]  # fmt: skip
+    wait_until(editor, lambda: all(tab.autosave.is_up_to_date for tab in editor.tabs.all))
+    assert len(folders(recovery_root())) == 2 and left in folders(recovery_root())

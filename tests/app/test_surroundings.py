@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import objectmorpher_core as om
-from editor_steps import wait_until
+from editor_steps import close_all, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.recovery import _left_in, when
 from objectmorpher_core.base.files import OutputError
@@ -235,7 +235,7 @@ def test_two_windows_on_one_session_leave_one_of_the_two(folder: Path, shared_ed
     path = folder / "both.omorph"
     save_session(mere_photo(), path)
     other = Editor(shared_editor.settings)
-    shared_editor.close_document()
+    close_all(shared_editor)
     try:
         for editor in (shared_editor, other):
             editor.filing.open(path)
@@ -251,4 +251,4 @@ def test_two_windows_on_one_session_leave_one_of_the_two(folder: Path, shared_ed
         assert dict(other.committed.backends)["segment"] == "second"
     finally:
         other.shut_down()
-        shared_editor.close_document()
+        close_all(shared_editor)

@@ -17,7 +17,10 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement, Prompt
 from tests.tree import PYTHONPATH
 
-ELSEWHERE = {"undo", "redo", "quit", "close", "revert", "open", "paste"}  # not about an edit
+ELSEWHERE = {  # not about an edit
+    "undo", "redo", "quit", "close", "revert", "open", "paste", "new_tab", "next_tab",
+    "previous_tab",
+}  # fmt: skip
 CHANGING = {  # commands of which a change is known: nobody may forget to look
     "grow", "shrink", "smooth", "feather", "remove_handle", "reset_handle",
     "reset_handles", "reset_pose", "reset_place", "reset_position", "reset_turn", "reset_size",

@@ -119,6 +119,7 @@ class Desk:
         then()
 
     def open(self, path: Path) -> Document:
+        self.editor.close()
         self.editor.filing.open(path)
         self.wait(lambda: None)
         return self.document

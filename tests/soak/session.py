@@ -245,10 +245,10 @@ class Session:
         self.editor.view.tool = ToolName.POSE
 
     def _open(self, path: Path) -> None:
-        before = self.editor.history
+        self.editor.close()  # what is unsaved is given up
         self.editor.filing.open(path)
         self._wait()
-        assert self.editor.history is not before, self.editor.message  # else it asks something
+        assert self.editor.history is not None, self.editor.message
 
     def _draw(self) -> None:
         scene = build_scene(self.editor, "gl")

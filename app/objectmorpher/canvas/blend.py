@@ -52,9 +52,10 @@ def build_blend(
         # What moved leaves a hole, unless a copy of it is still there.
         has_left = leaves_a_hole(document.objects, own.k)
         reach = REACH * splats.rest.spacing_px * max(item.placement.scale, 1.0)
+        reach *= document.photo.camera.focal / splats.rest.camera.focal
         reach += reach_of(lit.blur)
         least = max(composite.STILL, TOLERANCE / view.zoom) ** 2
-        if item.finish != AS_IN_THE_PHOTO:
+        if item.finish != AS_IN_THE_PHOTO or item.is_visitor:
             least = -1.0  # also what has not moved
         mark = (least, has_left)
         apart = _distance(splats, world, document.photo.camera, view, mark)

@@ -12,7 +12,7 @@ RENDERERS = ("auto", "gl", "tiles")
 class WindowOptions:
     """How to open the window; for tests also its lifetime and the file of its picture."""
 
-    file: Path | None = None  # a photo or a session to open at once
+    files: tuple[Path, ...] = ()  # photos and sessions to open at once
     renderer: str = "auto"  # one of RENDERERS
     theme: str | None = None  # "dark" or "light"; None: the user's setting
     scale: float | None = None  # canvas px per point; None: the monitor's

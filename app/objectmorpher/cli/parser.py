@@ -84,7 +84,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog=PROGRAM,
         description="Open a photo, click an object, drag points on it in 3D, save the photo.",
-        epilog="Without a subcommand the editor opens: objectmorpher [FILE]",
+        epilog="Without a subcommand the editor opens: objectmorpher [FILE ...]",
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
     add_subcommands(parser, "command", (*SUBCOMMANDS, *research_commands()))
@@ -92,10 +92,10 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def window_parser() -> argparse.ArgumentParser:
-    """The options of the editor's window: `objectmorpher [FILE]`."""
+    """The options of the editor's window: `objectmorpher [FILE ...]`."""
     parser = Parser(prog=PROGRAM, description="Open the editor.")
     add = parser.add_argument
-    add("file", nargs="?", type=Path, metavar="FILE", help="a photo or a session")
+    add("files", nargs="*", type=Path, metavar="FILE", help="photos or sessions, a tab each")
     add("--sample", dest="is_sample", action="store_true", help="open a sample photo")
     add("--renderer", choices=RENDERERS, default="auto", help="gl draws on the GPU, tiles does not")
     add("--theme", choices=("dark", "light"), help="for this run; default as in the preferences")
@@ -129,10 +129,10 @@ def window_options(options: argparse.Namespace) -> WindowOptions:
     """Return the parsed options in the form that the window takes."""
     from ..system.resources import resource
 
-    file = options.file or (resource(SAMPLE) if options.is_sample else None)
+    files = tuple(options.files) or ((resource(SAMPLE),) if options.is_sample else ())
     width, height = options.size
     return WindowOptions(
-        file, options.renderer, options.theme, options.scale, (int(width), int(height)),
+        files, options.renderer, options.theme, options.scale, (int(width), int(height)),
         options.fov, options.seed, options.frames, options.screenshot, options.frame_log,
         options.returns,
     )  # fmt: skip

@@ -28,7 +28,8 @@ def run_share(options: argparse.Namespace) -> None:
 
 def object_to_share(document: Document, number: int | None) -> int:
     """Return the index of object `number`, or of the first that is lifted. Raises UsageError."""
-    lifted = [k for k, item in enumerate(document.objects) if item.lifted is not None]
+    objects = enumerate(document.objects)  # the page has one photo
+    lifted = [k for k, item in objects if item.lifted is not None and not item.is_visitor]
     if document.plate is None or not lifted:
         raise UsageError("no object of the session is lifted, so there is nothing to drag")
     if number is None:

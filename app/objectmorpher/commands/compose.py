@@ -79,6 +79,8 @@ def not_moved(editor: Editor) -> str | None:
 def _cannot_take(editor: Editor) -> str | None:
     if editor.jobs.is_busy(SHADOW):
         return t("Its shadow is being looked for")
+    if editor.object is not None and editor.object.is_visitor:
+        return t("It comes from another photo, and left its shadow there")
     return not_moved(editor) or editor.composing.trouble
 
 

@@ -6,6 +6,7 @@ from ..editor.editor import Editor
 from ..editor.export_plan import What
 from ..editor.filing import Dialog
 from ..editor.view import Popup, ToolName
+from ..system.texts import t
 from ..tools import navigate
 from .command import (
     Command,
@@ -39,20 +40,34 @@ WINDOW_COMMANDS: dict[str, Command] = {popup.name.lower(): _toggle(popup) for po
 
 # Opening, saving, exporting.
 
+
+def _nothing_open(editor: Editor) -> str | None:
+    return None if len(editor.tabs.all) > 1 else no_photo(editor)
+
+
+def _no_other_tab(editor: Editor) -> str | None:
+    return None if len(editor.tabs.all) > 1 else t("No other photo is open")
+
+
 FILE_COMMANDS: dict[str, Command] = {
     "open": Command("Open…", "Ctrl+O", asks_for(Dialog.OPEN), never),
+    "new_tab": Command("New tab", "Ctrl+T", lambda e: e.tabs.add(), no_photo),
+    "next_tab": Command("Next tab", "Ctrl+Tab", lambda e: e.tabs.step(1), _no_other_tab),
+    "previous_tab": Command(
+        "Previous tab", "Ctrl+Shift+Tab", lambda e: e.tabs.step(-1), _no_other_tab
+    ),
     "save": Command("Save session", "Ctrl+S", lambda e: e.filing.save()),
     "save_as": Command("Save session as…", "Ctrl+Shift+S", asks_for(Dialog.SAVE)),
     "export": Command("Export photo…", "Ctrl+E", lambda e: e.exporting.open()),
     "send_back": Command(
         "Send back",
         "Ctrl+Enter",
-        lambda e: e.exporting.send_back(e.quit),
+        lambda e: e.exporting.send_back(lambda: e.filing.quit(e.quit, but=e.tab)),
         lambda e: no_photo(e) or e.exporting.why_not_back,
     ),
-    "close": Command("Close", "Ctrl+W", lambda e: e.filing.guard(e.close)),
+    "close": Command("Close", "Ctrl+W", lambda e: e.filing.close(e.tab), _nothing_open),
     "models": Command("Models…", "", lambda e: e.models.open(), never),
-    "quit": Command("Quit", "Ctrl+Q", lambda e: e.filing.guard(e.quit), never),
+    "quit": Command("Quit", "Ctrl+Q", lambda e: e.filing.quit(e.quit), never),
 }
 
 
@@ -63,12 +78,24 @@ def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
     return Command(tool.value, keys, lambda editor: editor.choose_tool(tool), why_not, is_on)
 
 
+def _copy_object(editor: Editor) -> None:
+    """Into the system's clipboard as a picture, and for other tabs as it is."""
+    editor.pasting.copy()
+    editor.exporting.copy(What.CUTOUT)
+
+
+def _nothing_copied(editor: Editor) -> str | None:
+    has_any = editor.pasting.has_copied
+    return no_photo(editor) or (None if has_any else t("Lift an object and copy it first"))
+
+
 COMMANDS: dict[str, Command] = {
     "undo": Command("Undo", "Ctrl+Z", lambda e: e.undo(), no_undo),
     "redo": Command("Redo", "Ctrl+Shift+Z", lambda e: e.redo(), no_redo, other_keys=("Ctrl+Y",)),
     "copy": Command("Copy photo", "Ctrl+C", lambda e: e.exporting.copy(What.PHOTO)),
-    "copy_object": Command(
-        "Copy object", "Ctrl+Shift+C", lambda e: e.exporting.copy(What.CUTOUT), no_selection
+    "copy_object": Command("Copy object", "Ctrl+Shift+C", _copy_object, no_selection),
+    "paste_object": Command(
+        "Paste object", "Ctrl+Shift+V", lambda e: e.pasting.paste(), _nothing_copied
     ),
     "paste": Command("Paste photo", "Ctrl+V", lambda e: e.filing.paste(), never),
     "select": _tool(ToolName.SELECT, "1", no_photo),

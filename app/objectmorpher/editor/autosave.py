@@ -1,7 +1,7 @@
 """Keeps what is not saved on the disk, so that a crash costs seconds of work and no more.
 
-Each running editor has a folder of its own in the user's data folder, as long as it shows
-something unsaved, and holds a lock on it. A folder whose lock nobody holds was left by an editor
+Each tab of a running editor has a folder of its own in the user's data folder, as long as it holds
+something unsaved, and a lock on it. A folder whose lock nobody holds was left by an editor
 that crashed; `recovery.py` offers it. A thread writes; the main thread compares two references.
 """
 
@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 import uuid
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -29,7 +30,7 @@ from objectmorpher_core.session.tree import SessionError
 from ..system.texts import t
 
 if TYPE_CHECKING:
-    from .state import EditorState
+    from .tab import Tab
 
 
 class FileLock:
@@ -115,8 +116,8 @@ class HeldJournal:
 class Autosave:
     """Looks each frame whether there is something new, and has it written."""
 
-    def __init__(self, editor: EditorState) -> None:
-        self._editor = editor
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
         self._asked: Document | None = None  # last one given to the thread
         self._asked_at = -INTERVAL  # s, monotonic
         self._is_kept = False  # the folder holds something, or soon will
@@ -128,12 +129,12 @@ class Autosave:
         self._given = self._done = 0  # orders; the one counted here, the other in the thread
         self._thread: threading.Thread | None = None
 
-    def poll(self) -> bool:
+    def poll(self, complain: Callable[[str], None] = lambda sentence: None) -> bool:
         """Once a frame, on the main thread. Whether anything changed: a complaint, at most."""
-        editor, document = self._editor, self._editor.committed
+        document = self._tab.document
         if self._problem is not None:
-            self._tell(self._problem)
-        if document is None or editor.is_saved:
+            self._tell(self._problem, complain)
+        if document is None or self._tab.is_saved:
             if self._is_kept:
                 self._asked, self._is_kept = None, False
                 self._order(None)
@@ -149,9 +150,7 @@ class Autosave:
     @property
     def is_up_to_date(self) -> bool:
         """Whether the disk holds what is unsaved, and nothing else of this editor."""
-        is_asked = (
-            not self._is_kept if self._editor.is_saved else self._asked is self._editor.committed
-        )
+        is_asked = not self._is_kept if self._tab.is_saved else self._asked is self._tab.document
         return is_asked and self._given == self._done
 
     def adopt(self, held: HeldJournal) -> None:
@@ -159,31 +158,37 @@ class Autosave:
         self._is_kept = True
         self._order(held)
 
-    def close(self) -> None:
-        """The editor ends. What is unsaved even now, after an error, stays to be recovered."""
-        document = self._editor.committed
-        if document is not None and not self._editor.is_saved and document is not self._asked:
+    def end(self) -> None:
+        """The tab is closed, or the editor ends.
+
+        What is unsaved even now, after an error, stays to be recovered.
+        """
+        document = self._tab.document
+        if document is not None and not self._tab.is_saved and document is not self._asked:
             self._order((document, self._about(document)))
-        elif document is None or self._editor.is_saved:
+        elif document is None or self._tab.is_saved:
             self._order(None)
         self._orders.put("end")
+
+    def join(self) -> None:
+        """Wait until it has ended."""
         if self._thread is not None:
             self._thread.join(FAREWELL)
 
     def _about(self, document: Document) -> About:
-        path, source = self._editor.path, self._editor.source
+        path, source = self._tab.path, self._tab.source
         return About(
             document.photo.name, datetime.now().isoformat(timespec="seconds"),
             sum(thing.mask is not None for thing in document.objects),
             str(path) if path else None, str(source) if source else None,
         )  # fmt: skip
 
-    def _tell(self, problem: str) -> None:
+    def _tell(self, problem: str, complain: Callable[[str], None]) -> None:
         """Once: the work goes on, and so does trying."""
         self._problem, self._asked = None, None
         if not self._is_told:
             self._is_told = True
-            self._editor.complain(t("Unsaved work cannot be kept safe: {reason}", reason=problem))
+            complain(t("Unsaved work cannot be kept safe: {reason}", reason=problem))
 
     # In the thread
 

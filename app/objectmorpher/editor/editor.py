@@ -18,7 +18,6 @@ from ..canvas.shape import Shapes
 from ..system.freed_memory import give_back
 from ..system.texts import t
 from ..worker.jobs import RELUCTANCE
-from .autosave import Autosave
 from .candidate import Candidates, CloserLook
 from .feedback import Hover
 from .filing import OPEN, Dialog, Filing
@@ -26,7 +25,7 @@ from .history import History
 from .intents.composing import Composing
 from .intents.computing import Computing
 from .intents.edging import Edging
-from .intents.exporting import Exporting
+from .intents.exporting import COPY, Exporting
 from .intents.hinting import Hinting
 from .intents.keying import Keying
 from .intents.landing import Landing
@@ -36,6 +35,7 @@ from .intents.masking import Masking
 from .intents.methods import Methods
 from .intents.models import Models
 from .intents.objects import Objects
+from .intents.pasting import Pasting
 from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
 from .intents.refining import RefiningIntents
@@ -47,7 +47,8 @@ from .recovery import Recovery
 from .refits import Refits
 from .settings import Settings
 from .state import EditorState
-from .tasks import SELECT, Tasks
+from .tabs import Tabs
+from .tasks import READY, SELECT, WRITE, Tasks
 from .view import USUAL_LEVEL, Shown, ToolName
 
 
@@ -79,11 +80,12 @@ class Editor(EditorState):
         self.composing = Composing(self, self.methods, self.tasks, self.choose_tool)
         self.hinting = Hinting(self, self.composing)
         self.refining, self.exporting = RefiningIntents(self, self.methods), Exporting(self)
-        self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.start)
+        self.tabs = Tabs(self, self.posing, self.tasks, self.start, self.leave)
+        self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.tabs)
         self.leaving_out = LeavingOut(self)
         self.sample = SampleOpening(self, self.filing, self.selection, self.tasks)
-        self.autosave = Autosave(self)
-        self.recovery = Recovery(self, self.autosave, self.filing, self.start, self.close)
+        self.recovery = Recovery(self, self.tabs)
+        self.pasting = Pasting(self, self.objects, self.tabs)
         self._pollers = self._in_order()
         self._ask_elsewhere()
 
@@ -104,7 +106,7 @@ class Editor(EditorState):
         return (
             self.jobs.poll, self.chores.poll, tasks.rehearse, tasks.ensure_fronts,
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.refining.deliver,
-            self.autosave.poll, self.candidates.poll, self.closer_look.poll, self.sample.poll,
+            self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
             self.leaving_out.poll,
         )  # fmt: skip
 
@@ -133,19 +135,39 @@ class Editor(EditorState):
         self.recovery.offer()
 
     def close(self) -> None:
-        """Closes the document, and lets go of what was computed for it: gigabytes, maybe."""
-        self.close_document()
+        """Closes the tab; nothing is asked here."""
+        self.tabs.close(self.tab)
+
+    def leave(self) -> None:
+        """The tab is not shown any more. What runs for it ends, and what was computed for it goes:
+
+        gigabytes, maybe.
+        """
+        self._stop()
+        self.message, self.hover = None, Hover()
         self._forget_derived()
 
     def _forget_derived(self) -> None:
-        self.cache = Cache()
+        patience, self.cache = self.cache.frame_time, Cache()
+        self.cache.frame_time = patience
         self._ask_elsewhere()
         give_back()
 
     def close_document(self) -> None:
-        self.hand.abort(self)
-        self.jobs.cancel(patience=RELUCTANCE)
+        """The tab shows none."""
         self.chores.cancel(OPEN)
+        self._stop()
+        self.forget_document()
+
+    def _stop(self) -> None:
+        """Ends what was begun and asked about the document; files are written to their end."""
+        self.hand.abort(self)
+        for kind in self.jobs.kinds:
+            if kind != COPY and not kind.startswith(WRITE):
+                self.jobs.cancel(kind, RELUCTANCE)
+        for kind in self.chores.kinds:
+            if kind.startswith(READY):
+                self.chores.cancel(kind)
         self.exporting.close()
         self.objects.carried = None
         self.tasks.forget()
@@ -156,11 +178,11 @@ class Editor(EditorState):
         self.refining.forget()
         self.posing.forget()
         self.posing.select(None)
-        self.forget_document()
 
     def quit(self) -> None:
         """Closes the program; nothing is asked here."""
         self.close_document()
+        self.tabs.forget_all()
         self.is_over = True
 
     def undo(self) -> None:
@@ -254,5 +276,5 @@ class Editor(EditorState):
 
     def shut_down(self) -> None:
         self.chores.close()
-        self.autosave.close()
+        self.tabs.end()
         self.jobs.close()

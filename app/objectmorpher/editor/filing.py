@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.base.progress import Progress
-from objectmorpher_core.document.model import Document
 
 from ..canvas.shape import Shapes, build_ready
 from ..system import clipboard
@@ -21,6 +20,8 @@ from .opening import PHOTO_ENDINGS, SESSION_ENDING, OpenedFile, is_object, read_
 if TYPE_CHECKING:
     from .intents.exporting import Exporting
     from .state import EditorState
+    from .tab import Tab
+    from .tabs import Tabs
     from .tasks import Tasks
 
 EXPORT_ENDINGS = tuple(
@@ -50,35 +51,47 @@ class Dialog(Enum):
 
 
 Uses = Mapping[Dialog, Callable[[Path], None]]
-Start = Callable[[Document, Shapes], None]
+Opened = tuple[OpenedFile, Path | None]
 
 
 class Filing:
     """Which file is which, and what waits for an answer about them."""
 
     def __init__(
-        self, editor: EditorState, tasks: Tasks, exporting: Exporting, uses: Uses, start: Start
+        self, editor: EditorState, tasks: Tasks, exporting: Exporting, uses: Uses, tabs: Tabs
     ) -> None:
-        """`uses`: what is done with the files of other dialogs; `start` shows a document."""
+        """`uses`: what is done with the files of other dialogs."""
         self._editor = editor
-        self._tasks, self._exporting, self._uses, self._start = tasks, exporting, uses, start
+        self._tasks, self._exporting, self._uses, self._tabs = tasks, exporting, uses, tabs
         self.fov: float | None = None  # degrees, of photos that are opened
         self.seed = 0  # likewise
         self.wanted: Dialog | None = None  # the window shows it
         self.question: Callable[[], None] | None = None  # goes on when the changes may be lost
+        self.asked: tuple[Tab, ...] = ()  # the tabs with the changes that the question is about
         self._after_save: Callable[[], None] | None = None
 
     def open(self, path: Path) -> None:
-        """Opens a photo or a session, after the question about unsaved changes."""
-        if not path.exists():  # then nothing has to be given up
+        """Opens a photo or a session in a tab, or goes to the tab that shows it already."""
+        if not path.exists():
             self._editor.complain(
                 t("{name} cannot be opened: there is no such file", name=path.name)
             )
             return
-        self.guard(lambda: self._open(path, lambda: self._remember(path)))
+        shown = self._tab_of(path)
+        if shown is None:
+            self._open(path, lambda: self._remember(path))
+        else:
+            self._tabs.go(shown)
+
+    def open_all(self, paths: Sequence[Path]) -> None:
+        """Opens files one after another, each in a tab; what cannot be opened is named."""
+        if len(paths) == 1:
+            self.open(paths[0])
+        else:
+            self._open_next(list(paths), [], [])
 
     def drop(self, paths: Sequence[Path]) -> None:
-        """Files were dropped on the window: the first that can be opened is.
+        """Files were dropped on the window: those that can be opened are, each in a tab.
 
         A 3D object takes the place of what is selected.
         """
@@ -89,16 +102,38 @@ class Filing:
             return
         kinds = (*PHOTO_ENDINGS, SESSION_ENDING)
         usable = [p for p in paths if p.suffix.lower() in kinds and not p.is_dir()]
-        chosen = usable[0] if usable else paths[0]
-        others = [p.name for p in paths if p is not chosen]
+        if len(paths) == 1 or not usable:
+            self.open(paths[0])
+        else:
+            self._open_next(usable, [], [p.name for p in paths if p not in usable])
 
-        def then() -> None:
-            self._remember(chosen)
-            if others:
-                self._editor.say(t("Opened {name}; not opened: {others}", name=chosen.name,
+    def _open_next(self, left: list[Path], opened: list[str], others: list[str]) -> None:
+        """`opened` and `others`: names of files that are open by now, and that cannot be."""
+        if not left:
+            if opened and others:
+                self._editor.say(t("Opened {name}; not opened: {others}", name=_listed(opened),
                                    others=_listed(others)))  # fmt: skip
+            return
+        path, *rest = left
 
-        self.guard(lambda: self._open(chosen, then))
+        def go_on() -> None:
+            self._remember(path)
+            self._open_next(rest, [*opened, path.name], others)
+
+        shown = self._tab_of(path)
+        if shown is None:
+            pass_over = lambda: self._open_next(rest, opened, [*others, path.name])  # noqa: E731
+            self._open(path, go_on, pass_over if rest or opened else None)
+        else:
+            self._tabs.go(shown, go_on)
+
+    def _tab_of(self, path: Path) -> Tab | None:
+        """The tab that shows the file as it is."""
+        for tab in self._tabs.all:
+            is_photo = tab.source == path and tab.history is not None and tab.history.count == 1
+            if tab.path == path or is_photo:
+                return tab
+        return None
 
     def open_sample(self, path: Path, then: Callable[[], None] = lambda: None) -> None:
         """Opens a photo that came with the program: it is nobody's file to go back to."""
@@ -107,18 +142,32 @@ class Filing:
             self._editor.source = None
             then()
 
-        self.guard(lambda: self._open(path, start))
+        self._open(path, start)
 
     def _remember(self, path: Path) -> None:
         self._editor.settings = self._editor.settings.with_recent(path)
 
-    def guard(self, then: Callable[[], None]) -> None:
-        """`then`, at once where nothing would be lost, or after the user's answer."""
+    def close(self, tab: Tab) -> None:
+        """Closes a tab, after the question about what is unsaved in it."""
+        self.guard(lambda: self._tabs.close(tab), (tab,))
+
+    def quit(self, end: Callable[[], None], but: Tab | None = None) -> None:
+        """`end`, after one question about all tabs, save `but`, with unsaved changes."""
+        self.guard(end, tuple(tab for tab in self._tabs.all if tab is not but))
+
+    def guard(self, then: Callable[[], None], tabs: tuple[Tab, ...]) -> None:
+        """`then`, at once where nothing of `tabs` would be lost, or after the user's answer."""
         self._editor.hand.abort(self._editor)
-        if self._editor.is_saved:
+        asked = tuple(tab for tab in tabs if not tab.is_saved)
+        if not asked:
             then()
+        elif len(asked) == 1:  # the user sees what it is about
+            self._tabs.go(asked[0], lambda: self._ask(then, asked))
         else:
-            self.question = then
+            self._ask(then, asked)
+
+    def _ask(self, then: Callable[[], None], asked: tuple[Tab, ...]) -> None:
+        self.question, self.asked = then, asked
 
     def answer_discard(self) -> None:
         then, self.question = self.question, None
@@ -126,8 +175,22 @@ class Filing:
             then()
 
     def answer_save(self) -> None:
-        self._after_save, self.question = self.question, None
-        self.save()
+        then, self.question = self.question, None
+        if then is not None:
+            self._save_all(self.asked, then)
+
+    def _save_all(self, tabs: tuple[Tab, ...], then: Callable[[], None]) -> None:
+        """Saves one after another; where the user does not name a file, the rest is left."""
+        left = tuple(tab for tab in tabs if not tab.is_saved)
+        if not left:
+            then()
+            return
+
+        def save() -> None:
+            self._after_save = lambda: self._save_all(left[1:], then)
+            self.save()
+
+        self._tabs.go(left[0], save)
 
     def answer_cancel(self) -> None:
         self.question = None
@@ -186,53 +249,51 @@ class Filing:
         return folder / f"{stem}-edited{ending}"
 
     def paste(self) -> None:
-        """Opens the photo in the clipboard, or the file there, after the usual question."""
+        """Opens the photo in the clipboard, or the file there."""
 
-        def read(progress: Progress) -> tuple[OpenedFile, Path | None]:
+        def read(progress: Progress) -> Opened:
             pasted = clipboard.paste()
             if pasted.path is not None:
                 return read_document(pasted.path, self.fov, self.seed, progress), pasted.path
             return read_photo(pasted.data, pasted.name, self.fov, self.seed), None
 
-        self.guard(lambda: self._begin(t("Pasting"), read, lambda: None))
+        self._begin(t("Pasting"), read, lambda: None)
 
-    def _open(self, path: Path, then: Callable[[], None]) -> None:
+    def _open(
+        self, path: Path, then: Callable[[], None], pass_over: Callable[[], None] | None = None
+    ) -> None:
         """Reads the file in a thread; `then` is called when it is shown."""
 
-        def read(progress: Progress) -> tuple[OpenedFile, Path | None]:
+        def read(progress: Progress) -> Opened:
             return read_document(path, self.fov, self.seed, progress), path
 
-        self._begin(t("Opening {name}", name=path.name), read, then)
+        self._begin(t("Opening {name}", name=path.name), read, then, pass_over)
 
     def _begin(
-        self, title: str, read: Callable[[Progress], tuple[OpenedFile, Path | None]],
-        then: Callable[[], None],
+        self, title: str, read: Callable[[Progress], Opened], then: Callable[[], None],
+        pass_over: Callable[[], None] | None = None,
     ) -> None:  # fmt: skip
-        """What is open now may be lost: that was asked. What is done to it meanwhile may not."""
-        editor, given_up = self._editor, self._editor.committed
+        """`pass_over` goes on with others where this cannot be opened; else that is said."""
+        editor = self._editor
 
         def prepared(progress: Progress) -> tuple[OpenedFile, Path | None, Shapes]:
             opened, path = read(progress)
             return opened, path, build_ready(opened.document)
 
-        def show(opened: OpenedFile, path: Path | None, shapes: Shapes) -> None:
-            self._start(opened.document, shapes)
+        def accept(answer: tuple[OpenedFile, Path | None, Shapes]) -> None:
+            opened, path, shapes = answer
+            self._tabs.open(opened.document, shapes)
             editor.path = path if opened.is_session else None
             editor.source = None if opened.is_session else path
             then()
 
-        def accept(answer: tuple[OpenedFile, Path | None, Shapes]) -> None:
-            if editor.committed is given_up or editor.is_saved:
-                show(*answer)
-            else:
-                self.guard(lambda: show(*answer))
-
         def fail(error: JobError) -> None:
-            editor.complain_of(replace(error, trace="") if error.is_expected else error)
+            if pass_over is None:
+                editor.complain_of(replace(error, trace="") if error.is_expected else error)
+            else:
+                pass_over()
 
-        editor.chores.start(
-            title, prepared, kind=OPEN, done=accept, failed=fail,
-        )  # fmt: skip
+        editor.chores.start(title, prepared, kind=OPEN, done=accept, failed=fail)
 
     def forget_recent(self, path: str) -> None:
         """A recent file that is not there any more."""

@@ -137,6 +137,11 @@ class History:
 
     # Memory
 
+    def limit_to(self, limit: int) -> None:
+        """Old steps may hold so many bytes from now on."""
+        self._limit = limit
+        self._forget_oldest()
+
     @property
     def old_bytes(self) -> int:
         """Return the bytes that the steps hold beyond those of the shown document."""

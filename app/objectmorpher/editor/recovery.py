@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import shutil
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -23,9 +22,8 @@ from .autosave import LOCK, FileLock, HeldJournal, recovery_root
 from .feedback import Action
 
 if TYPE_CHECKING:
-    from .autosave import Autosave
-    from .filing import Filing, Start
     from .state import EditorState
+    from .tabs import Tabs
 
 log = logging.getLogger(__name__)
 
@@ -49,17 +47,8 @@ class Left:
 class Recovery:
     """The sessions that can be recovered."""
 
-    def __init__(
-        self,
-        editor: EditorState,
-        autosave: Autosave,
-        filing: Filing,
-        start: Start,
-        close: Callable[[], None],
-    ) -> None:
-        self._editor = editor
-        self._autosave, self._filing = autosave, filing
-        self._start, self._close = start, close
+    def __init__(self, editor: EditorState, tabs: Tabs) -> None:
+        self._editor, self._tabs = editor, tabs
         self.left: tuple[Left, ...] = ()  # newest first
         self._is_unseen = False
 
@@ -94,11 +83,7 @@ class Recovery:
         else:
             text = t("Unsaved work of {count} earlier sessions is still here",
                      count=len(self.left))  # fmt: skip
-            editor.say(text, Action(t("Show"), lambda: self._filing.guard(self._close)))
-
-    def recover(self, left: Left) -> None:
-        """Opens it, unsaved as it was; its folder is this editor's from then on."""
-        self._filing.guard(lambda: self._recover(left))
+            editor.say(text, Action(t("Show"), self._tabs.add))
 
     def discard(self, left: Left) -> None:
         """Deletes it for good."""
@@ -107,7 +92,8 @@ class Recovery:
         if lock is not None:
             HeldJournal(Journal(left.folder), lock).remove()
 
-    def _recover(self, left: Left) -> None:
+    def recover(self, left: Left) -> None:
+        """Opens it, unsaved as it was; its folder is its tab's from then on."""
         editor = self._editor
         lock = FileLock.take(left.folder / LOCK) if left.folder.is_dir() else None
         if lock is None:
@@ -123,11 +109,11 @@ class Recovery:
         def accept(answer: tuple[Document, Shapes]) -> None:
             document, shapes = answer
             self._forget(left)
-            self._start(document, shapes)
+            self._tabs.open(document, shapes)
             editor.path, editor.source = left.path, left.source
             assert editor.history is not None
             editor.history.mark_unsaved()
-            self._autosave.adopt(HeldJournal(Journal(left.folder), lock))
+            editor.autosave.adopt(HeldJournal(Journal(left.folder), lock))
             editor.say(t("Recovered {name} as it was at {time}", name=left.name,
                          time=when(left.edited)))  # fmt: skip
 

@@ -126,6 +126,7 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
     "Place": (
         ("Drag", "Move the object"),
         ("Drag another object", "Choose and move it"),
+        ("Drag on to a tab", "Copy it into that photo"),
         ("Wheel while dragging", "Nearer, farther"),
         ("Corner", "Scale"),
         ("Ring", "Turn · Shift: in steps of 15°"),

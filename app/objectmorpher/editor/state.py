@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.document import lock_edits
+from objectmorpher_core.document import lock_edits, visitor_edits
 from objectmorpher_core.document.model import Document, EditObject
 
 from ..canvas.derived import Derived
@@ -23,9 +23,11 @@ from ..worker.job_functions import WARM
 from ..worker.jobs import Jobs
 from ..worker.requests import JobError
 from ..worker.threads import Chores
+from .autosave import Autosave
 from .feedback import Action, Hover, StatusMessage
 from .history import History
 from .settings import Settings
+from .tab import Tab
 from .view import ViewState
 
 
@@ -40,16 +42,54 @@ class EditorState:
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
         self.cache = Cache()
-        self.history: History | None = None
+        self.tab = Tab()  # the one that is shown; `tabs.py` has them all
         self._preview: Document | None = None
-        self.path: Path | None = None  # the session's file
-        self.source: Path | None = None  # the photo's file
-        self.current = 0  # index of the object that the tools change
         self.hover = Hover()
         self.pointer: Pointer | None = None  # where it is now, on the canvas
         self.rubber: tuple[float, float, float, float] | None = None  # box being drawn, canvas px
         self.message: StatusMessage | None = None
         self.is_over = False  # the window closes
+
+    # Of the tab that is shown
+
+    @property
+    def history(self) -> History | None:
+        return self.tab.history
+
+    @history.setter
+    def history(self, history: History | None) -> None:
+        self.tab.history = history
+
+    @property
+    def path(self) -> Path | None:
+        """The session's file."""
+        return self.tab.path
+
+    @path.setter
+    def path(self, path: Path | None) -> None:
+        self.tab.path = path
+
+    @property
+    def source(self) -> Path | None:
+        """The photo's file."""
+        return self.tab.source
+
+    @source.setter
+    def source(self, source: Path | None) -> None:
+        self.tab.source = source
+
+    @property
+    def current(self) -> int:
+        """Index of the object that the tools change."""
+        return self.tab.current
+
+    @current.setter
+    def current(self, current: int) -> None:
+        self.tab.current = current
+
+    @property
+    def autosave(self) -> Autosave:
+        return self.tab.autosave
 
     # What there is
 
@@ -76,7 +116,7 @@ class EditorState:
     @property
     def committed(self) -> Document | None:
         """The document without the stroke in progress."""
-        return self.history.document if self.history else None
+        return self.tab.document
 
     @property
     def object(self) -> EditObject | None:
@@ -100,7 +140,7 @@ class EditorState:
 
     @property
     def is_saved(self) -> bool:
-        return self.history is None or self.history.is_saved
+        return self.tab.is_saved
 
     def is_on_photo(self, canvas_xy: np.ndarray) -> bool:
         if self.photo_size is None:
@@ -137,12 +177,26 @@ class EditorState:
             self.history.apply(label, document)
 
     def _is_refused(self, changed: Document) -> bool:
-        """Whether it changes a locked object, which is said."""
+        """Whether it changes a locked object, or the outline of a visitor, which is said."""
         before = self.committed
+        visitor = None if before is None else visitor_edits.changes_visitor(before, changed)
+        if visitor is not None:
+            self.say_visitor(visitor)
+            return True
         own = None if before is None else lock_edits.locked_change(before, changed)
         if before is not None and own is not None:
             self.say_locked(next(k for k, each in enumerate(before.objects) if each is own))
         return own is not None
+
+    def say_visitor(self, visitor: EditObject) -> None:
+        """That the outline and shape of an object of another photo are changed there."""
+        self.say(_of_elsewhere(visitor))
+
+    @property
+    def visitor_note(self) -> str | None:
+        """The same of the current object; None of one of this photo."""
+        own = self.object
+        return _of_elsewhere(own) if own is not None and own.is_visitor else None
 
     def say_locked(self, k: int) -> None:
         """That object `k` is locked, with a button that unlocks it."""
@@ -167,3 +221,10 @@ class EditorState:
         preview, self.preview = self.preview, None
         if preview is not None and label:
             self.apply(label, preview)
+
+
+def _of_elsewhere(visitor: EditObject) -> str:
+    assert visitor.lifted is not None and visitor.lifted.origin is not None
+    photo = visitor.lifted.origin.photo
+    return t("{name} comes from {photo}: change its outline there, and copy it again",
+             name=visitor.name, photo=photo)  # fmt: skip

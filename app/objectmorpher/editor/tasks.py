@@ -318,7 +318,7 @@ class Tasks:
             return False
         # A fill is of these masks, and of the hints that are in force.
         wanted = (*(o.mask for o in document.objects), *document.hints)
-        if not any(o.lifted for o in document.objects):
+        if not any(o.lifted and not o.is_visitor for o in document.objects):
             return False
         if self._plate is not None and same(self._plate[0], wanted):
             self._add_plate(self._plate[1])
@@ -390,15 +390,15 @@ class Tasks:
 
     def save(self, path: Path, then: Callable[[], None] | None = None) -> None:
         """Writes the session, and goes on with `then` when it is on the disk."""
-        editor, history = self._editor, self._editor.history
+        editor, tab, history = self._editor, self._editor.tab, self._editor.history
         if history is None:
             return
         document = history.document
 
         def accept(_: None) -> None:
-            if editor.history is history:
+            if tab.history is history:  # which may not be the tab that is shown by now
                 history.mark_saved(document)
-                editor.path = path
+                tab.path = path
                 editor.settings = editor.settings.with_recent(path)
                 editor.say(t("Saved {name} in {folder}", name=path.name,
                              folder=folder_of(path)))  # fmt: skip
@@ -406,7 +406,14 @@ class Tasks:
                     then()
 
         def fail(error: JobError) -> None:
-            editor.complain_of(error.retried_by(lambda: self.save(path, then)))  # as it is by then
+            again = (
+                error
+                if editor.tab is not tab
+                else error.retried_by(
+                    lambda: self.save(path, then)  # as it is by then
+                )
+            )
+            editor.complain_of(again)
 
         editor.jobs.start(
             t("Saving {name}", name=path.name), job_functions.write_session, document, path,

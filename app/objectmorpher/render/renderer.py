@@ -274,7 +274,8 @@ class Renderer:
             return None
         try:
             camera = view.camera(item.camera)
-            return self._splats().draw(item.splats, item.texture, camera, item.camera)
+            carried = item.splats.rest.carried(item.camera)
+            return self._splats().draw(item.splats, item.texture, camera, carried)
         except moderngl.Error as error:
             self.kind = "tiles"
             reason = str(error).strip().partition("\n")[0]

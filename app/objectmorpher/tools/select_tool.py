@@ -21,10 +21,24 @@ MIN_BOX = 3.0  # image px, either side; a smaller box is a slip
 STEP = 1.5  # points between two places of a line that is drawn
 
 
+def _is_on_visitor(editor: Editor, pointer: Pointer) -> bool:
+    """Whether the pointer is on an object of another photo, which is chosen and said then."""
+    seen, document = editor.landing.moved_at(pointer.xy), editor.document
+    if seen is None or document is None or not document.objects[seen].is_visitor:
+        return False
+    editor.objects.take(seen)
+    editor.say_visitor(document.objects[seen])
+    return True
+
+
 class SelectTool:
     """Left click adds, right click removes, drag draws a box or, in Lasso mode, a line."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
+        if _is_on_visitor(editor, pointer):
+            return ignore()
+        if editor.object is not None and editor.object.is_visitor:  # there is nothing to correct
+            editor.objects.start_another()
         if pointer.button is Button.RIGHT:
             return self._remove_click(editor, pointer)
         if editor.view.selecting.mode is SelectMode.LASSO:

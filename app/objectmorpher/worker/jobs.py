@@ -148,6 +148,11 @@ class Jobs(Executor):
     def is_idle(self) -> bool:
         return self.current is None and not self._waiting
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        current = () if self.current is None else (self.current.kind,)
+        return (*current, *self._waiting)
+
     def cancel(self, kind: str | None = None, patience: float = PATIENCE) -> None:
         """Stops the running and waiting requests of a kind, or all, within `patience` s."""
         for job in [j for j in self._waiting.values() if kind in (None, j.kind)]:

@@ -138,6 +138,11 @@ class Executor(ABC):
     def is_idle(self) -> bool:
         """Whether nothing waits or runs."""
 
+    @property
+    @abstractmethod
+    def kinds(self) -> tuple[str, ...]:
+        """Return the kinds of what runs and waits."""
+
     @abstractmethod
     def is_busy(self, kind: str) -> bool:
         """Whether a request of this kind waits or runs."""

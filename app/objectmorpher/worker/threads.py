@@ -43,6 +43,10 @@ class Chores(Executor):
     def is_idle(self) -> bool:
         return not self._running
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        return tuple(self._running)
+
     def is_busy(self, kind: str) -> bool:
         return kind in self._running
 

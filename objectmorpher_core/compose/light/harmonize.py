@@ -38,6 +38,7 @@ MAP = 96  # px, longer side of the small picture of the background
 RING = 0.15  # x the silhouette's longer side, how far around the object one looks
 LEAST, MOST = 0.6, 1.6  # gain in linear light
 DEAD = 0.08  # in logarithms of linear light: less is no difference of light
+STRANGE = 0.25  # likewise between two photos, whose things are others; looked at, not fitted
 DOUBT = 4.0  # x how far the quarters of a place are apart: that, too, says nothing
 # x how far the ratio's colour is off from warmer or colder: red, green, blue, luminance.
 OFF = np.array([2.0, 2.0, 2.0, 1.0])
@@ -83,8 +84,35 @@ def light_gain(light: F32, width: int, before: Silhouette, now: Silhouette) -> G
         return NEUTRAL
     whole, ratio = _difference(old.mean, new.mean)
     # What differs within each of the places for no light's reason may differ between them, too.
-    doubt = DEAD + DOUBT * _spread(old, new, np.array([*ratio, whole]))
-    doubt += OFF * float(np.linalg.norm(ratio - (ratio @ WARMER) * WARMER))
+    return _gain(whole, ratio, DEAD + DOUBT * _spread(old, new, np.array([*ratio, whole])))
+
+
+def light_around(light: F32, width: int, place: Silhouette) -> tuple[float, float, float] | None:
+    """Linear RGB of the background around a place; None where too little of it is seen."""
+    found = _around(light, width, place)
+    if found is None:
+        return None
+    r, g, b = found.mean.tolist()
+    return r, g, b
+
+
+def visitor_gain(
+    own: tuple[float, float, float] | None, now: tuple[float, float, float] | None
+) -> Gain:
+    """Return the factors of the colours of an object of another photo, at full strength.
+
+    `own` is the light around it there, `now` around where it is here. What stands around it are
+    other things in other colours: a tint that no light has says nothing, as within one photo.
+    """
+    if own is None or now is None:
+        return NEUTRAL
+    whole, ratio = _difference(np.array(own), np.array(now))
+    return _gain(whole, ratio, np.full(4, DEAD + STRANGE))
+
+
+def _gain(whole: np.ndarray, ratio: F64, doubt: F64) -> Gain:
+    """The factors for a difference that may be wrong by `doubt` (4,): channels, luminance."""
+    doubt = doubt + OFF * float(np.linalg.norm(ratio - (ratio @ WARMER) * WARMER))
     wanted = _beyond(whole, doubt[3]) + COLOUR * _beyond(ratio, doubt[:3])
     linear = np.clip(wanted, np.log(LEAST), np.log(MOST))
     r, g, b = np.exp(linear / GAMMA).tolist()

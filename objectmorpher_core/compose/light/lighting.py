@@ -26,7 +26,16 @@ from ..shadow.shadow import COARSE, FINE, Shade, StandingObject, cast, ground_no
 from ..silhouette import SKETCHED, sketch, sketched
 from .defocus import PhotoDefocus, StandingPlane, find_defocus
 from .grain import Grain, find_grain, sketch_grain
-from .harmonize import LUMA, NEUTRAL, Gain, at_strength, light_gain, light_map
+from .harmonize import (
+    LUMA,
+    NEUTRAL,
+    Gain,
+    at_strength,
+    light_around,
+    light_gain,
+    light_map,
+    visitor_gain,
+)
 from .noise import Noise, find_noise
 from .relight import Relit, relight
 
@@ -134,9 +143,7 @@ class Lighting:
             standing = stand(splats, camera, horizon, item.shadow, most)
             shade = None if standing is None else cast(item.shadow, standing, cells)
         if has_light:
-            before, now = sketch(rest(), camera), sketch(splats, camera)
-            if before is not None and now is not None:
-                gain = at_strength(light_gain(self.light, camera.width, before, now), item.harmony)
+            gain = at_strength(self._gain(item, splats, rest), item.harmony)
         if item.relight > 0:
             relit = relight(splats, self._light_of(item), item.relight, camera, is_sketch)
         if item.grain > 0 and self.noise is not None:
@@ -151,6 +158,23 @@ class Lighting:
             (r, g, b), shade, relit, grain, math.hypot(blur, own.blur), own.sharpness,
             own.saturation, own.opacity, own.blend_mode,
         )  # fmt: skip
+
+    def _gain(self, item: EditObject, splats: PosedSplats, rest: Callable[[], PosedSplats]) -> Gain:
+        """The factors of an object's colours in the light of where it is now."""
+        camera, width = self._document.photo.camera, self._document.photo.camera.width
+        now = sketch(splats, camera)
+        if now is None:
+            return NEUTRAL
+        origin = None if item.lifted is None else item.lifted.origin
+        if origin is not None:
+            return visitor_gain(origin.light, light_around(self.light, width, now))
+        before = sketch(rest(), camera)
+        return NEUTRAL if before is None else light_gain(self.light, width, before, now)
+
+    def around(self, splats: PosedSplats) -> tuple[float, float, float] | None:
+        """Linear RGB of the background around an object; None where too little of it is seen."""
+        now = sketch(splats, self._document.photo.camera)
+        return None if now is None else light_around(self.light, self._document.photo.size[0], now)
 
     def _defocus(
         self, item: EditObject, splats: PosedSplats, rest: PosedSplats, horizon: float | None

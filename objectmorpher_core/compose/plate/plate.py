@@ -45,6 +45,8 @@ def plate_cover(document: Document) -> Mask:
     width, height = document.photo.size
     covered = np.zeros((height, width), bool)
     for item in document.objects:
+        if item.is_visitor:
+            continue
         if item.matte is not None:
             shared = overlap(item.matte.box, (0, 0, width, height))
             if shared is not None:
@@ -184,7 +186,8 @@ def plate_of_holes(
     if plate is not None and ghosts:
         shares = shown_shares(document, ghosts, holes)
         plate = with_ghosts(plate, document.photo.pixels, ghosts, shares)
-    rest = [o for o in document.objects if o.mask is not None and o.matte not in holes]
+    there = [o for o in document.objects if o.mask is not None and not o.is_visitor]
+    rest = [o for o in there if o.matte not in holes]
     if plate is None or not rest:
         return plate
     covered = np.zeros(plate.hole.shape, bool)

@@ -213,7 +213,8 @@ def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
     if matte is None:
         return _glb([MeshPart(world, triangles, colors=near.blended(body.colors))], None)
     is_front = seen[triangles].mean(1) > SEEN
-    uv = _places_in(matte, puppet.camera.project(lifted.world_points(points)))
+    camera = puppet.camera if lifted.origin is None else lifted.origin.camera
+    uv = _places_in(matte, camera.project(lifted.world_points(points)))
     parts = [
         _part(world, triangles[is_front], uv=uv),
         _part(world, triangles[~is_front], colors=near.blended(body.colors)),

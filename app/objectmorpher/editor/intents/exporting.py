@@ -94,8 +94,9 @@ class Exporting:
             return t("Click an object in the photo first")
         if what is What.SOLID:
             return self._why_no_shape()
-        has_plate = document is not None and document.plate is not None
         objects = () if document is None else document.objects
+        is_bare = what is not What.BACKGROUND and objects and all(o.is_visitor for o in objects)
+        has_plate = bool(is_bare) or (document is not None and document.plate is not None)
         is_lifted = any(item.lifted is not None for item in objects)
         if what is What.DEPTH and not is_lifted:
             return t("Lift an object first")

@@ -52,7 +52,9 @@ class Landing:
     def is_current_moved(self) -> bool:
         """Whether the current object is seen elsewhere than in the photo."""
         thing = self._editor.object
-        return thing is not None and thing.is_moved and thing.is_visible and self.is_edit_shown
+        if thing is None or thing.is_visitor:
+            return False
+        return thing.is_moved and thing.is_visible and self.is_edit_shown
 
     def moved_at(self, canvas_xy: np.ndarray) -> int | None:
         """Index of the moved object that is seen at canvas px (2,); None where none is."""

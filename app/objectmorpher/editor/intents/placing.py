@@ -18,6 +18,7 @@ from objectmorpher_core.document.placement import (
     turned,
     with_centre,
 )
+from objectmorpher_core.document.visitor_edits import ground_for
 
 from ...canvas.derived import ObjectFrame
 from ...system.texts import t
@@ -121,11 +122,9 @@ class Placing:
         document, thing = self._editor.document, self._editor.object
         if document is None or thing is None or thing.lifted is None:
             return None, t("Lift an object first")
-        points = thing.lifted.world_points(thing.lifted.body.means)
-        try:
-            return ground_under(points, document.photo.camera, self.horizon), None
-        except GroundError:
-            return None, t("The object's lowest point is above the horizon, so it cannot stand")
+        if (ground := ground_for(document, thing)) is not None:
+            return ground, None
+        return None, t("The object's lowest point is above the horizon, so it cannot stand")
 
     def stood(self, placement: Placement) -> Placement:
         """`placement`, moved up or down so that the object stands on the ground, if it is to."""

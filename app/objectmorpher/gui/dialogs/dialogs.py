@@ -16,7 +16,7 @@ from ...editor.intents.models import GIVEN, MODEL_ENDING
 from ...editor.opening import OBJECT_ENDINGS
 from ...system.texts import t
 from ..widgets.modal import is_confirmed, is_dismissed, modal
-from ..widgets.theme import FIELD, PRIMARY, theme
+from ..widgets.theme import FIELD, PRIMARY, Icon, theme
 from ..widgets.widgets import Emphasis, button
 from .export_dialog import draw_export
 from .file_chooser import FileChooser
@@ -24,6 +24,7 @@ from .models_dialog import draw_models
 
 HELPERS = ("zenity", "kdialog", "matedialog", "qarma")  # what the system's dialogs need on Linux
 QUESTION = 400.0  # points, width
+LISTED = 8  # changed photos that it names
 FILTERS = {
     Dialog.OPEN: (*PHOTO_ENDINGS, SESSION_ENDING),
     Dialog.SAVE: (SESSION_ENDING,),
@@ -96,6 +97,11 @@ class Dialogs:
         if editor.filing.question is None:
             return
         about = t("The session keeps the selection, the 3D object and its pose.")
+        asked = editor.filing.asked
+        if len(asked) > 1:
+            about = "\n".join([f"{Icon.IMAGE}  {tab.name}" for tab in asked[:LISTED]])
+            if (more := len(asked) - LISTED) > 0:
+                about += "\n" + t(" and {count} more", count=more).strip()
         with modal(t("Save what you have changed?"), QUESTION, about) as is_shown:
             if is_shown:
                 self._draw_answers(editor.filing)
@@ -103,7 +109,8 @@ class Dialogs:
     def _draw_answers(self, filing: Filing) -> None:
         answer = None
         top = imgui.get_cursor_pos_y()
-        if button(t("Save session"), Emphasis.PRIMARY, width=132) or is_confirmed():
+        label = t("Save session") if len(filing.asked) == 1 else t("Save all")
+        if button(label, Emphasis.PRIMARY, width=132) or is_confirmed():
             answer = filing.answer_save
         lower = top + theme.pt((PRIMARY - FIELD) / 2)  # in the middle of the taller button
         imgui.same_line()

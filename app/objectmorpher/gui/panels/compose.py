@@ -83,6 +83,10 @@ def draw_compose(editor: Editor) -> None:
 
 def _draw_background(editor: Editor) -> None:
     heading(t("Background"))
+    objects = () if editor.document is None else editor.document.objects
+    if all(item.is_visitor or item.lifted is None for item in objects):
+        note(t("It is the photo itself: what comes from another photo leaves no hole."))
+        return
     is_bare = checkbox(t("Show it alone"), editor.view.compose.is_bare)
     tooltip(t("Without the objects, to repair it by painting (B)"))
     if is_bare != editor.view.compose.is_bare:

@@ -111,6 +111,9 @@ def draw_refinement_note(editor: Editor) -> None:
 
 def draw_mask(editor: Editor) -> None:
     heading(t("Brush"))
+    if (elsewhere := editor.visitor_note) is not None:
+        note(f"{elsewhere}.")
+        return
     selecting = editor.view.selecting
     selecting.painted = segmented("painted", _kinds(), selecting.painted)
     selecting.is_erasing = segmented("brush", _ways(selecting.painted), selecting.is_erasing)
@@ -196,6 +199,9 @@ def draw_select(editor: Editor) -> None:
         level = segmented("level", _levels(), editor.selection.level)
         if level != editor.selection.level:
             editor.selection.set_level(level)
+    if (elsewhere := editor.visitor_note) is not None:
+        note(f"{elsewhere}.")
+        return
     draw_command(editor, "subject")
     draw_command(editor, "clear")
     _draw_facts(editor)

@@ -62,7 +62,8 @@ class Fades:
 fades = Fades()
 
 
-TOOLS, INSPECTOR, STATUS, START = "##tools", "##inspector", "##status", "##start"  # their names
+TABS, TOOLS, INSPECTOR = "##tabs", "##tools", "##inspector"  # their names
+STATUS, START = "##status", "##start"
 
 FLAGS = (
     imgui.WindowFlags_.no_decoration

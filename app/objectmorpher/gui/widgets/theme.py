@@ -21,6 +21,7 @@ TITLE_SIZE = 28.0
 ICON_SIZE = 15.0
 
 MENU = 32.0  # points: heights and widths of the window's parts
+TABS = 32.0
 STRIP = 48.0
 INSPECTOR = 300.0
 FOLDED = 36.0  # the inspector where there is no room for it

@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from ...editor.editor import Editor
-from ..widgets.panes import INSPECTOR, START, STATUS, TOOLS
+from ..widgets.panes import INSPECTOR, START, STATUS, TABS, TOOLS
 
 MENU = "##MainMenuBar"  # ImGui's name of it
 ANY_POPUP = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
@@ -68,9 +68,10 @@ class KeyboardFocus:
         """In the order of F6; "" is the photo, which is not there before one is open."""
         is_telling = editor.message is not None or not editor.jobs.is_idle
         last = (STATUS,) if is_telling or self._pane == STATUS else ()
+        tabs = (TABS,) if len(editor.tabs.all) > 1 else ()
         if editor.document is None:
-            return (START, *last, MENU)
-        return ("", TOOLS, INSPECTOR, *last, MENU)
+            return (START, *last, MENU, *tabs)
+        return ("", TOOLS, INSPECTOR, *last, MENU, *tabs)
 
     def _go_on(self, editor: Editor, step: int) -> None:
         panes = self._panes(editor)

@@ -324,7 +324,12 @@ class Input:
             editor.hand.move(pointer)  # before the release: both may come in one slow frame
         else:
             editor.posing.relax()
-        if not is_down:
+        if is_down:
+            return
+        if (tab := editor.tabs.aimed) is not None and not self.crosshair.is_shown:
+            editor.hand.abort(editor)
+            editor.pasting.carry(tab)
+        else:
             editor.hand.move(replace(pointer, is_down=False))
 
 

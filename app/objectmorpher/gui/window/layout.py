@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..widgets.theme import FOLDED, INSPECTOR, MENU, STATUS, STRIP, theme
+from ..widgets.theme import FOLDED, INSPECTOR, MENU, STATUS, STRIP, TABS, theme
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Layout:
     """The parts of the window; with no photo the canvas is all between menu and status."""
 
     menu: Rect
+    tabs: Rect
     strip: Rect
     canvas: Rect
     inspector: Rect
@@ -39,17 +40,21 @@ def has_panel(width: float, wanted: bool | None) -> bool:
     return width >= theme.pt(NARROW) if wanted is None else wanted
 
 
-def lay_out(width: float, height: float, has_photo: bool, has_panel: bool = True) -> Layout:
+def lay_out(
+    width: float, height: float, has_photo: bool, has_panel: bool = True, has_tabs: bool = False
+) -> Layout:
     """Lay out a window of that size, window units. A folded panel is a strip with a button."""
-    menu, status = theme.pt(MENU), theme.pt(STATUS)
+    menu, status, tabs = theme.pt(MENU), theme.pt(STATUS), theme.pt(TABS) if has_tabs else 0.0
+    top = menu + tabs
     strip = theme.pt(STRIP) if has_photo else 0.0
     inspector = theme.pt(INSPECTOR if has_panel else FOLDED) if has_photo else 0.0
-    middle = max(height - menu - status, 1.0)
+    middle = max(height - top - status, 1.0)
     across = max(width - strip - inspector, 1.0)
     return Layout(
         menu=Rect(0, 0, width, menu),
-        strip=Rect(0, menu, strip, middle),
-        canvas=Rect(strip, menu, across, middle),
-        inspector=Rect(width - inspector, menu, inspector, middle),
+        tabs=Rect(0, menu, width, tabs),
+        strip=Rect(0, top, strip, middle),
+        canvas=Rect(strip, top, across, middle),
+        inspector=Rect(width - inspector, top, inspector, middle),
         status=Rect(0, height - status, width, status),
     )

@@ -65,9 +65,13 @@ def _draw_tool(editor: Editor, tool: ToolName, icon: str, name: str, hint: str) 
 
 LEAST_NAME = 48.0  # points of room, with less the file's name is left out
 MENUS: dict[str, tuple[str, ...]] = {
-    "File": ("open", "recent", "-", "save", "save_as", "export", "send_back", "-", "close", "quit"),
+    "File": (
+        "new_tab", "open", "recent", "-", "save", "save_as", "export", "send_back", "-", "close",
+        "quit",
+    ),
     "Edit": (
-        "undo", "redo", "-", "copy", "copy_object", "paste", "-", "select_handles",
+        "undo", "redo", "-", "copy", "copy_object", "paste", "paste_object", "-",
+        "select_handles",
         "remove_handle", "reset_handle", "reset_handles", "-", "reset_pose", "reset_place",
     ),
     "Select": (
@@ -84,7 +88,9 @@ MENUS: dict[str, tuple[str, ...]] = {
         "zoom_in", "zoom_out", "fit", "actual", "double", "pixels", "-",
         *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
     ),
-    "Window": ("panel", "history", "snapshot", "models", "preferences"),
+    "Window": (
+        "next_tab", "previous_tab", "-", "panel", "history", "snapshot", "models", "preferences",
+    ),
     "Help": ("palette", "help", "shortcuts", "-", "about"),
 }  # fmt: skip
 

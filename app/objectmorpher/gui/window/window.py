@@ -43,6 +43,7 @@ from .menu import draw_menu, draw_toolbar
 from .overlays import draw_overlays
 from .scenes import build_scene
 from .status import draw_status
+from .tab_bar import draw_tabs
 
 log = logging.getLogger(__name__)
 
@@ -168,10 +169,10 @@ class Window:
 
     def _open_first(self) -> None:
         """What takes a second to import waits until the window has been drawn, and not for it."""
-        if self._options.file is not None:
-            self.editor.filing.open(self._options.file)
+        if self._options.files:
+            self.editor.filing.open_all(self._options.files)
         if self._options.frames is None:
-            self.editor.recovery.look(is_shown=self._options.file is None)
+            self.editor.recovery.look(is_shown=not self._options.files)
             self.editor.models.look()
             self.editor.chores.start(
                 "Getting ready", lambda progress: self._warm_up(), kind="warm up",
@@ -222,6 +223,8 @@ class Window:
         self._input.update(self.editor, layout.canvas, ratio)
         layout = self._lay_out()
         draw_menu(self.editor, layout.menu)
+        if layout.tabs.height:
+            draw_tabs(self.editor, layout.tabs)
         if self.editor.document is None:
             self._start.draw(self.editor, layout.canvas)
         else:
@@ -245,7 +248,8 @@ class Window:
     def _lay_out(self) -> Layout:
         view, size = self.editor.view, self._size.size
         view.has_panel = has_panel(size[0], view.wants_panel)
-        return lay_out(*size, self.editor.document is not None, view.has_panel)
+        has_photo, has_tabs = self.editor.document is not None, len(self.editor.tabs.all) > 1
+        return lay_out(*size, has_photo, view.has_panel, has_tabs)
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
@@ -282,6 +286,8 @@ class Window:
         io.config_drag_click_to_input_text = True
         io.mouse_double_click_time = DOUBLE_CLICK
         io.config_flags |= imgui.ConfigFlags_.no_mouse_cursor_change
+        context = imgui.get_current_context()  # Ctrl+Tab is between photos, not ImGui's windows
+        context.config_nav_windowing_key_next = context.config_nav_windowing_key_prev = 0
         looks.load_fonts()
         take_key: Any = self._take_key
         take_character: Any = self._take_character

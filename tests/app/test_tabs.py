@@ -1,0 +1,216 @@
+"""Several photos in tabs: each keeps what is its own, and none is lost."""
+
+from __future__ import annotations
+
+import gc
+import random
+import weakref
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from editor_steps import close_all, open_file, wait_for_jobs, wait_until
+from objectmorpher.commands import run, why_not
+from objectmorpher.editor.autosave import recovery_root
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.filing import Dialog
+from objectmorpher.editor.tab import Tab
+from objectmorpher.editor.view import Shown, ToolName
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.session.file import decode_session
+
+
+@pytest.fixture
+def tabs(editor: Editor, ball: Document) -> Iterator[Editor]:
+    """Three tabs, the last one shown: two of the lifted ball, and one of the photo alone."""
+    editor.tabs.open(ball)
+    editor.tabs.open(replace(ball, photo=replace(ball.photo, name="other.png")))
+    editor.tabs.open(replace(ball, photo=replace(ball.photo, name="bare.png"), objects=()))
+    yield editor
+    close_all(editor)
+    wait_for_jobs(editor)
+
+
+def go(editor: Editor, tab: Tab) -> None:
+    editor.tabs.go(tab)
+    wait_until(editor, lambda: editor.tab is tab)
+
+
+def move(editor: Editor, x: float) -> None:
+    """A step in the tab that is shown."""
+    editor.placing.move_to(Placement(move=(x, 0.0)))
+    editor.commit("Move object")
+
+
+def facts(tab: Tab) -> tuple[object, ...]:
+    assert tab.history is not None
+    return tab.document, tab.history, tab.history.steps, tab.path, tab.source, tab.current
+
+
+def test_going_from_tab_to_tab_changes_no_document(tabs: Editor) -> None:
+    """Each has its own document, steps, files, selection and view; undo stays within it."""
+    first, second, third = tabs.tabs.all
+    go(tabs, first)
+    move(tabs, 5.0)
+    tabs.view.tool = ToolName.PLACE
+    tabs.view.set_zoom(3.0, (100.0, 80.0), (180, 140))
+    place = tabs.view.place
+    go(tabs, second)
+    tabs.view.shown = Shown.DEPTH
+    tabs.source = Path("/photos/other.png")
+    kept = {tab: facts(tab) for tab in (first, second, third)}
+    way = random.Random(3)
+    for _ in range(30):
+        if way.random() < 0.5:
+            go(tabs, way.choice((first, second, third)))
+        else:
+            at, by = tabs.tabs.all.index(tabs.tab), way.choice((1, -1))
+            run(tabs, "next_tab" if by > 0 else "previous_tab")
+            wait_until(tabs, lambda at=at, by=by: tabs.tabs.all.index(tabs.tab) == (at + by) % 3)
+        tabs.poll()
+        assert {tab: facts(tab) for tab in (first, second, third)} == kept
+        assert tabs.view.shown is (Shown.DEPTH if tabs.tab is second else Shown.COMPOSITE)
+    go(tabs, second)
+    tabs.undo()
+    assert facts(second) == kept[second], "there is nothing to undo"
+    go(tabs, first)
+    assert tabs.view.place == place and tabs.view.tool is ToolName.PLACE
+    tabs.undo()
+    assert first.is_saved
+
+
+def test_a_tab_that_is_left_holds_no_more_than_its_document(tabs: Editor) -> None:
+    """What drawing takes is kept for the tab that was left last, so that one can go back."""
+    first, second, third = tabs.tabs.all
+    go(tabs, first)
+    document = first.document
+    assert document is not None
+    shape = weakref.ref(tabs.derived.shape(document.photo, document.objects[0]))
+    cache = weakref.ref(tabs.cache)
+    go(tabs, second)
+    wait_for_jobs(tabs)
+    gc.collect()
+    assert cache() is None and shape() is not None
+    tabs.tabs.go(first)
+    assert tabs.tab is first, "at once"
+    go(tabs, second)
+    go(tabs, third)
+    wait_for_jobs(tabs)
+    gc.collect()
+    assert shape() is None
+
+
+def test_the_steps_of_all_tabs_together_hold_what_one_may(tabs: Editor) -> None:
+    whole = tabs.settings.history_mb << 20
+    histories = [tab.history for tab in tabs.tabs.all if tab.history is not None]
+    assert sum(history._limit for history in histories) <= whole
+    tabs.tabs.close(tabs.tabs.all[0])
+    assert len(tabs.tabs.all) == 2
+    assert all(tab.history and tab.history._limit == whole // 2 for tab in tabs.tabs.all)
+
+
+def test_a_session_that_is_open_is_not_opened_twice(
+    tabs: Editor, tmp_path: Path, photo_bytes: bytes
+) -> None:
+    first, _, third = tabs.tabs.all
+    go(tabs, first)
+    tabs.filing.save_as(tmp_path / "a.omorph")
+    wait_until(tabs, lambda: first.path is not None)
+    go(tabs, third)
+    tabs.filing.open(tmp_path / "a.omorph")
+    wait_until(tabs, lambda: tabs.tab is first)
+    (tmp_path / "fourth.png").write_bytes(photo_bytes)
+    open_file(tabs, tmp_path / "fourth.png")
+    assert [tab.name for tab in tabs.tabs.all] == [
+        "a.omorph", "fourth.png", "other.png", "bare.png"
+    ]  # fmt: skip
+
+
+def test_the_start_screen_of_a_new_tab_gives_way_to_what_is_opened(
+    tabs: Editor, photo_path: Path
+) -> None:
+    run(tabs, "new_tab")
+    assert tabs.document is None and len(tabs.tabs.all) == 4
+    assert why_not(tabs, "new_tab") is not None
+    open_file(tabs, photo_path)
+    assert len(tabs.tabs.all) == 4 and tabs.source == photo_path
+    run(tabs, "new_tab")
+    run(tabs, "close")
+    wait_until(tabs, lambda: len(tabs.tabs.all) == 4)
+    assert tabs.source == photo_path
+
+
+def test_closing_asks_for_each_tab_and_quitting_once_for_all(tabs: Editor, tmp_path: Path) -> None:
+    first, second, third = tabs.tabs.all
+    for tab, x in ((first, 3.0), (second, 4.0)):
+        go(tabs, tab)
+        move(tabs, x)
+    go(tabs, third)
+    tabs.filing.close(first)
+    wait_until(tabs, lambda: tabs.filing.question is not None)
+    assert tabs.tab is first, "the user sees what the question is about"
+    tabs.filing.answer_cancel()
+    assert first in tabs.tabs.all
+    run(tabs, "quit")
+    assert tabs.filing.asked == (first, second) and not tabs.is_over
+    tabs.filing.answer_save()
+    for tab, name in ((first, "a"), (second, "b")):
+        wait_until(tabs, lambda tab=tab: tabs.tab is tab and tabs.filing.wanted is Dialog.SAVE)
+        tabs.filing.wanted = None
+        tabs.filing.choose(Dialog.SAVE, tmp_path / f"{name}.omorph")
+    wait_until(tabs, lambda: tabs.is_over)
+    tabs.is_over = False
+    for name, x in (("a", 3.0), ("b", 4.0)):
+        saved = decode_session((tmp_path / f"{name}.omorph").read_bytes())
+        assert saved.objects[0].placement.move == (x, 0.0)
+
+
+def test_a_save_that_ends_in_another_tab_is_of_the_one_it_began_in(
+    tabs: Editor, tmp_path: Path
+) -> None:
+    first, second, _ = tabs.tabs.all
+    go(tabs, first)
+    move(tabs, 3.0)
+    tabs.filing.save_as(tmp_path / "a.omorph")
+    tabs.tabs.go(second)
+    wait_until(tabs, lambda: first.is_saved and tabs.tab is second)
+    assert first.path == tmp_path / "a.omorph" and second.path is None
+
+
+def test_unsaved_work_of_every_tab_is_kept_safe(
+    tabs: Editor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OBJECTMORPHER_DATA", str(tmp_path / "data"))
+    first, second, third = tabs.tabs.all
+    for tab, x in ((first, 3.0), (second, 4.0)):
+        go(tabs, tab)
+        move(tabs, x)
+    go(tabs, third)
+
+    def settled() -> bool:
+        return all(tab.autosave.is_up_to_date for tab in tabs.tabs.all)
+
+    wait_until(tabs, settled)
+    assert len(list(recovery_root().iterdir())) == 2
+    tabs.tabs.close(first)
+    wait_until(tabs, lambda: len(list(recovery_root().iterdir())) == 1)
+    go(tabs, second)
+    tabs.undo()
+    wait_until(tabs, lambda: settled() and not list(recovery_root().iterdir()))
+
+
+def test_a_lift_that_was_left_goes_on_when_one_comes_back(tabs: Editor, ball: Document) -> None:
+    selected = replace(ball.objects[0], matte=None, lifted=None)
+    unlifted = replace(ball, objects=(selected,), plate=None)
+    tabs.tabs.open(unlifted)
+    tab, first = tabs.tab, tabs.tabs.all[0]
+    wait_for_jobs(tabs)
+    run(tabs, "lift")
+    go(tabs, first)
+    wait_for_jobs(tabs)
+    assert tab.document is unlifted
+    go(tabs, tab)
+    wait_until(tabs, lambda: tabs.is_lifted)
+    assert tab.history is not None and tab.history.count == 2
