@@ -52,9 +52,11 @@ class ReliefSilhouette:
         if mask[:, -1].any():
             inside[:, -2] |= inside[:, -3]
         corner = (left - extension[2] - cell, top - extension[0] - cell)
+        # What closes beyond the frame has an outline there.
+        first, last = np.add([top, left], crop.shape) == whole.shape
         is_open = (
-            bool(mask[0].any()), bool(mask[-1].any()),
-            bool(mask[:, 0].any()), bool(mask[:, -1].any()),
+            bool(extension[0] and top == 0), bool(extension[1] and first),
+            bool(extension[2] and left == 0), bool(extension[3] and last),
         )  # fmt: skip
         return ReliefSilhouette(inside, cell, *corner, extent, is_open)
 
