@@ -46,16 +46,14 @@ class ReliefSilhouette:
         crop = whole[top : rows[-1] + 1, left : columns[-1] + 1]
         extent = float(max(crop.shape))
         cell = max(1.0, extent / GRID)
-        inside = np.pad(_reduced(crop, cell), 1)
-        if mask[-1].any():  # the frame may cut the last cells, which are no less inside for that
-            inside[-2] |= inside[-3]
-        if mask[:, -1].any():
-            inside[:, -2] |= inside[:, -3]
-        corner = (left - extension[2] - cell, top - extension[0] - cell)
+        # What closes beyond the frame has an outline there.
+        first, last = np.add([top, left], crop.shape) == whole.shape
         is_open = (
-            bool(mask[0].any()), bool(mask[-1].any()),
-            bool(mask[:, 0].any()), bool(mask[:, -1].any()),
+            bool(extension[0] and top == 0), bool(extension[1] and first),
+            bool(extension[2] and left == 0), bool(extension[3] and last),
         )  # fmt: skip
+        inside = np.pad(_reduced(crop, cell, is_open[1], is_open[3]), 1)
+        corner = (left - extension[2] - cell, top - extension[0] - cell)
         return ReliefSilhouette(inside, cell, *corner, extent, is_open)
 
     @property
@@ -158,13 +156,20 @@ def lower_hull(x: F64, y: F64) -> list[int]:
     return hull
 
 
-def _reduced(crop: Mask, cell: float) -> Mask:
-    """The crop (H, W) on cells (h, w) of `cell` px; never empty."""
+def _reduced(crop: Mask, cell: float, goes_down: bool, goes_right: bool) -> Mask:
+    """The crop (H, W) on cells (h, w) of `cell` px; never empty.
+
+    The frame may cut the last cells, which are no less inside for that where the object goes on.
+    """
     grid = tuple(int(np.ceil(n / cell)) for n in crop.shape)
     step = max(1, int(cell / FINENESS))
     size = [(round(n * cell) + 1 + step - 1) // step for n in grid]
     padded = np.zeros((size[0] * step, size[1] * step), np.uint8)
     np.multiply(crop, 255, out=padded[: crop.shape[0], : crop.shape[1]], dtype=np.uint8)
+    if goes_down:
+        padded[crop.shape[0] :] = padded[crop.shape[0] - 1]
+    if goes_right:
+        padded[:, crop.shape[1] :] = padded[:, crop.shape[1] - 1 : crop.shape[1]]
     blocks = cv2.resize(padded, (size[1], size[0]), interpolation=cv2.INTER_AREA)
     whole = np.asarray(blocks, np.float32) * np.float32(1 / 255)
     if cell > 1.0:

@@ -52,7 +52,8 @@ def stand(silhouette: ReliefSilhouette, camera: Camera, horizon: float | None) -
     `horizon`: the row of the photo it lies in, px. None: unknown, and guessed.
     """
     x, y = silhouette.lower_outline
-    if silhouette.is_open[1] or len(x) < 3:
+    is_cut = silhouette.is_open[1] or y.max(initial=0.0) > camera.height + silhouette.cell
+    if is_cut or len(x) < 3:
         return FLAT
     if (prism := find_prism(silhouette, camera, horizon)) is not None:
         return StandingSheet(_upright(silhouette, prism.plan, prism.turn), prism)

@@ -15,7 +15,7 @@ from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
 from .recognition import SHEET, PlacedShape, Recognised
 
-STRAY = 0.1  # x extent, from which a front is something else than the shape's
+STRAY = 0.2  # x extent, from which a front is something else than the shape's
 ROUNDS = 4  # of a plane that is fitted to most of a front
 SOFT = 0.02  # x extent, over which one gives way to the other
 ALONG = 0.05  # x extent, over which a tube's middle is smoothed

@@ -26,6 +26,7 @@ WEIGHTS, LEFT_OUT, PROFILE = (3.0, 0.5, 0.5), 8.0, (0.1, 0.5)
 LONGEST = 2.5  # description, of which half are what they are said to be
 WIDTH = 0.25  # of descriptions, over which that changes
 LEAST = 0.3  # weight, below which an object is free
+WHOLE = 0.85  # weight, from which it is nothing but the shape
 # Weight from which a thing is flat. A solid that is taken for a sheet loses 4 dB when it turns; a
 # sheet that is left free is only puffed. Of forty solids none is above this, of forty sheets 29.
 FLAT = 0.93
@@ -54,6 +55,7 @@ class Recognised:
 
     def over(self, outline: ReliefSilhouette, camera: Camera) -> PlacedShape:
         """The shape on the cells of a silhouette."""
+        weight = min(self.weight / WHOLE, 1.0)
         first = (outline.photo_xy(np.zeros(2)) - [camera.cx, camera.cy]) / camera.focal
         grid = RayGrid(
             (float(first[0]), float(first[1])), outline.cell / camera.focal, outline.shape
@@ -61,7 +63,7 @@ class Recognised:
         if self.plane is not None:
             rays = np.concatenate([grid.tangents, np.ones((*grid.shape, 1))], -1)
             near = np.maximum(rays @ self.plane, 0.3 * float(np.median(rays @ self.plane)))
-            return PlacedShape(1 / near, 1 / near, np.ones(outline.shape), self.weight)
+            return PlacedShape(1 / near, 1 / near, np.ones(outline.shape), weight)
         assert self.mesh is not None
         seen = drawn(self.mesh, grid)
         met = (seen.near > 0) & outline.inside
@@ -72,7 +74,7 @@ class Recognised:
         near, far = (1 / field.ravel()[nearest] for field in (seen.near, seen.far))
         gap = cv2.distanceTransform((~met).astype(np.uint8), cv2.DIST_L2, 3) * outline.cell
         share = np.clip(2 - gap / (REACH * outline.extent), 0, 1)
-        return PlacedShape(near, far, share, self.weight)
+        return PlacedShape(near, far, share, weight)
 
 
 @dataclass(frozen=True, eq=False)

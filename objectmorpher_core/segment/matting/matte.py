@@ -13,7 +13,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, U8, Mask, Pixels, Selection
+from ...base.arrays import F32, F64, U8, Mask, Pixels, Selection
 from ...base.pixels import unit_pixels
 from ...document.model import Matte
 from ..mask_edit import FULL, grow, is_selected, is_soft
@@ -25,6 +25,7 @@ BAND = 0.0040  # x the photo's diagonal: how far a mask's edge may be off, about
 MIN_BAND = 2.0  # px
 REACH = 4.0  # x band: how far from the mask's edge alpha may be soft
 MARGIN = 4.0  # x band, kept around the object in the crop
+LOOKED = 4  # px from the frame, at least, over which a run's width is seen to change
 EXTENSION = 0.12  # x the object's size: how far it goes on where the photo ends
 
 
@@ -84,7 +85,8 @@ def extended_part(
 def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Selection:
     """`mask` (H, W), bool or u8, continued like `extended`, but only where it touches the frame.
 
-    What merely stands near the frame must not come back as its own mirror image.
+    What merely stands near the frame must not come back as its own mirror image, and what becomes
+    narrower towards it goes on closing: a ball that touches the frame has its pole there.
     """
     if not any(extension):
         return mask
@@ -93,9 +95,66 @@ def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Sele
     height, width = whole.shape
     for axis, near, far in ((0, top, height - bottom), (1, left, width - right)):
         turned = np.moveaxis(whole, axis, 0)  # a view: both sides are changed in place
-        turned[:near] = np.minimum.accumulate(turned[near::-1])[:0:-1]
-        turned[far:] = np.minimum.accumulate(turned[far - 1 :])[1:]
+        turned[: near + 1] = _closing(np.minimum.accumulate(turned[near::-1]), turned[near:far])[
+            ::-1
+        ]
+        turned[far - 1 :] = _closing(
+            np.minimum.accumulate(turned[far - 1 :]),
+            turned[far - 1 : near - 1 if near else None : -1],
+        )
     return whole
+
+
+def _closing(beyond: Selection, inner: Selection) -> Selection:
+    """`beyond` (n, w), rows outward from the frame's own, no wider than its runs go on as conics.
+
+    `inner` (m, w): rows inward, likewise from the frame's own. The square of a conic's chord is a
+    parabola over the row.
+    """
+    own = is_selected(inner)
+    ends = np.flatnonzero(np.diff(own[0], prepend=False, append=False)).reshape(-1, 2)
+    far = np.arange(len(beyond))
+    at = np.arange(own.shape[1])
+    kept = np.zeros(beyond.shape, bool)
+    for first, last in ends:
+        squares = _chords(own[: max(LOOKED, len(beyond))], int(first), int(last)) ** 2
+        narrower, bent = _parabola(squares)
+        chords = np.sqrt(np.maximum(squares[0] - far * (narrower - bent * far), 0.0))
+        middle = 0.5 * (first + last - 1)
+        kept |= np.abs(at - middle) <= 0.5 * chords[:, None] - 0.5 + 1e-6
+    return np.where(kept, beyond, beyond.dtype.type(0))
+
+
+def _parabola(squares: F64) -> tuple[float, float]:
+    """How `squares` (k,) grow, per step and per step's square: growing, and less and less."""
+    steps = np.arange(len(squares), dtype=np.float64)
+    if len(steps) < LOOKED:
+        return 0.0, 0.0
+    powers = np.stack([steps, steps**2], -1)
+    growth, bend = np.linalg.lstsq(powers, squares - squares[0], rcond=None)[0]
+    if bend > 0:
+        growth, bend = float(steps @ (squares - squares[0]) / (steps @ steps)), 0.0
+    return (float(growth), float(bend)) if growth > 0 else (0.0, 0.0)
+
+
+def _chords(rows: Mask, first: int, last: int) -> F64:
+    """(k,) the lengths, row by row, of the run [first, last) of the first of `rows` (n, w).
+
+    Of a run that parts in two both count; it ends where nothing of it is left.
+    """
+    found = []
+    for row in rows:
+        inside = np.flatnonzero(row[first:last])
+        if not len(inside):
+            break
+        before = np.flatnonzero(~row[: first + inside[0]])
+        after = np.flatnonzero(~row[first + inside[-1] :])
+        first, last = (
+            int(before[-1]) + 1 if len(before) else 0,
+            first + int(inside[-1]) + int(after[0]) if len(after) else len(row),
+        )
+        found.append(float(last - first))
+    return np.array(found)
 
 
 def cut_out(pixels: Pixels, mask: Selection, mixed: Mask | None = None) -> Matte:

@@ -15,7 +15,9 @@ from objectmorpher_core.segment.matting.matte import (
     band_width,
     build_matte,
     extended,
+    extended_mask,
     extended_part,
+    frame_extension,
     signed_distance,
     soft_cutout,
     unveiled,
@@ -431,3 +433,20 @@ def test_tiles_leave_no_trace(monkeypatch):
     assert ((alpha > 0) & (alpha < 1)).mean() > 0.01
     assert np.abs(colours.foreground - whole.foreground).max() < ROUNDING
     assert len(colours.rows) == len(whole.rows)
+
+
+def test_what_closes_towards_the_frame_closes_beyond_it():
+    rng = np.random.default_rng(0)
+    rows, columns = np.mgrid[-100:200, :400]
+    for k in range(12):
+        above = rng.uniform(40, 70)  # px of the middle below the frame
+        half = above * rng.uniform(1.0, 1.6), rng.uniform(40, 120)
+        whole = np.hypot((rows - above) / half[0], (columns - 200) / half[1]) < 1
+        mask = np.rot90(whole[100:], k)
+        extension = frame_extension(mask)
+        found = np.rot90(extended_mask(mask, extension), -k)
+        true = whole[100 - max(extension) :]
+        assert (found != true).sum() <= 0.01 * true.sum() + 2 * half[1]
+    limb = np.zeros((80, 60), bool)
+    limb[30:, 20:35] = True
+    assert extended_mask(limb, frame_extension(limb))[30:, 20:35].all(), "a limb goes on as it is"
