@@ -50,7 +50,8 @@ where DINOv2's weights are not there).
   draws itself; nobody's weights are in it. At work it reads DINOv2 ViT-S/14's tokens (Apache-2.0).
 - **Training**: `objectmorpher train shape --folder F --samples {samples} --passes {passes:g}`:
   {steps} steps of {batch} samples; half an hour for the samples and an hour and a quarter for the
-  training on two cores, without a GPU. Called again it goes on where it was stopped; `--start` goes
+  training on two cores, without a GPU (three and a half hours on cores without bfloat16; a GPU is
+  used where PyTorch finds one). Called again it goes on where it was stopped; `--start` goes
   on from weights that ship. The same plan draws the same samples.
 
 ## What it has seen

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
-from objectmorpher_core.raster.rules import RULES, coverage, facing_weight, ramp
+from objectmorpher_core.raster.reference_layers import ReferenceComposite, Sums
+from objectmorpher_core.raster.rules import RULES, SPLATTINGS, coverage, facing_weight, ramp
 from objectmorpher_core.raster.texture import TextureLevels, build_levels, sample_texture
 from tests import shapes
 
@@ -158,3 +160,23 @@ def test_coverage_is_one_pixel_wide_at_any_slope():
         half = 0.5 * RULES.edge_width * slope
         assert coverage(level + half, slope, RULES) == pytest.approx(1, abs=1e-3)
         assert coverage(level - half, slope, RULES) == pytest.approx(0, abs=1e-3)
+
+
+@pytest.mark.parametrize("own", [0.0, 0.02, 0.5, 1.0])
+def test_a_side_behind_a_rim_is_seen_however_little_of_the_photo_it_shows(own):
+    """What shows the same point of the photo as a rim is the rim's own surface, under its matte."""
+    view = Camera.from_fov(3, 3)
+    nothing = build_levels(np.zeros((3, 3, 3), np.float32), np.zeros((3, 3), np.float32), 0, 0)
+    composite = ReferenceComposite(nothing, view, view, SPLATTINGS["edged solid"])
+    rim, side = Sums(3, 3), Sums(3, 3)
+    for layer in (rim, side):
+        layer.total += 2.0
+        layer.seen += 2.0
+        layer.magnified += 2.0
+    side.side += 2.0 * (1 - own)
+    side.side_shift += 500.0 * (1 - own)  # invented pictures lie beside the photo
+    side.unmatted += 2.0
+    side.ended += 2.0
+    composite.add(rim)
+    composite.add(side)
+    assert np.abs(composite.alpha - (1 - own)).max() < 1e-6
