@@ -31,7 +31,7 @@ uniform bool is_edged;           // rules.Splatting
 layout(location = 0) out vec4 color;   // added up: premultiplied
 layout(location = 1) out vec4 detail;  // added up: the first visible layer's depth, shift (zw)
 layout(location = 2) out vec4 median;  // added up: with which alpha reaches a half: the same
-layout(location = 3) out vec4 look;    // of this layer: shift, share that looks there, coverage
+layout(location = 3) out vec4 look;    // of this layer: shift, share of the photo itself, coverage
 layout(location = 4) out vec4 cover;   // clear before, alpha, has_depth, whether more may follow
 
 const float HALF = 0.5;  // reference.py: MEDIAN
@@ -93,7 +93,7 @@ void main() {
     float whole = 1.0 - exp(covers.z), solid = 1.0 - exp(covers.w);
 #endif
     float alpha = mix(solid, whole, matte);
-    float share = shown / total * (is_own ? 1.0 - aside : aside);  // that looks at `shift`
+    float share = shown / total * max(1.0 - aside, 0.0);
     shown *= matte;
     float weight = 1.0 / max(shown + body, 1e-30);
     vec3 mixed = (shown * texel.rgb + colors.rgb) * weight;

@@ -240,12 +240,6 @@ def _cover(s, start, end, total, across, down, clear, rules):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _looking(side):
-    """Of what shows the photo the share that looks where the layer does; `side` is aside."""
-    return ONE - side if ONE - side > LEAST_PHOTO else side
-
-
-@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _put_first(s, start, end, visible, opaque, closing):
     """The first layer: nothing is in front of it."""
     for k in range(start, end):
@@ -259,7 +253,7 @@ def _put_first(s, start, end, visible, opaque, closing):
         s[m.LAST_WHOLE + k] = whole
         s[m.LAST_X + k] = x
         s[m.LAST_Y + k] = y
-        s[m.LAST_SHARE + k] = _looking(s[m.SIDE + k]) * photo / max(total, TINY)
+        s[m.LAST_SHARE + k] = max(ONE - s[m.SIDE + k], ZERO) * photo / max(total, TINY)
         shown = photo * matte
         scale = alpha / max(shown + body, TINY)
         depth = s[m.DEPTH + k] / max(total, TINY)
@@ -288,7 +282,7 @@ def _put_behind(s, start, end, rules, closing):
         alpha = shows * (matte * whole + (ONE - matte) * solid)
         x, y = s[m.SHX + k], s[m.SHY + k]
         ex, ey = x - s[m.LAST_X + k], y - s[m.LAST_Y + k]
-        share, last_share = _looking(s[m.SIDE + k]) * photo / total, s[m.LAST_SHARE + k]
+        share, last_share = max(ONE - s[m.SIDE + k], ZERO) * photo / total, s[m.LAST_SHARE + k]
         same = np.float32(ramp(math.sqrt(ex * ex + ey * ey), far, near)) * share * last_share
         before, last_whole, last_through = s[m.O_A + k], s[m.LAST_WHOLE + k], s[m.LAST_THROUGH + k]
         clear = ONE - before

@@ -123,7 +123,7 @@ class ReferenceComposite:
         self.from_photo = np.zeros(shape)
         self.shift = np.zeros((*shape, 2))
         self.last_shift = np.zeros((*shape, 2))  # of the previous layer
-        self.last_share = np.zeros(shape)  # of it, that looks there
+        self.last_share = np.zeros(shape)  # of it, that shows the photo itself
         self.last_through = np.ones(shape)  # transmittance before it
         self.last_whole = np.zeros(shape)  # its coverage
 
@@ -172,8 +172,7 @@ class ReferenceComposite:
         seen = within * visible / weight * shown / np.maximum(shown + body, 1e-30)
         distance = np.linalg.norm(shift - self.last_shift[at], axis=1)
         same = smoothstep(distance, RULES.apart, RULES.same_point)
-        looking = np.where(is_own, 1 - side, side)  # of the photo part, what looks at `shift`
-        share = np.where(is_photo, looking * photo / total, 0.0)
+        share = np.where(is_photo, np.maximum(1 - side, 0) * photo / total, 0.0)
         same = same * share * self.last_share[at]
         clear = 1 - self.alpha[at]
         apart, split = clear * alpha, self.last_through[at] * (1 - self.last_whole[at]) * alpha
