@@ -69,7 +69,7 @@ The product alone, on the ten and on ten further solids (`HELD_OUT` in `solids.p
 chosen on those but for plate and cup, which were looked at while rims and lips were made; the
 lamp's numbers were seen once while free forms were closed at their outline. From when on a thing is
 wholly the plain shape it looks like was chosen on ball, box, brick, mug, ring and robot, and looked
-at on eight of those held out: the vase's turns changed, by 0.1 dB in the mean. Means over both
+at on eight of those held out: vase and beaker changed, and gain 0.1 dB. Means over both
 directions of a turn; `make_lifting.py quick NAME ...` prints each turn of one.
 
 - **Wobble**: the total absolute curvature of the outline over the true one's (evenly resampled,
