@@ -10,9 +10,7 @@ import hashlib
 import os
 import re
 import sys
-import tomllib
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 
 import platformdirs
@@ -38,6 +36,9 @@ def extra(name: str) -> str:
 
 def requirements(extra: str) -> tuple[str, ...]:
     """What an extra of the program wants, as pip takes it; "": what the program itself wants."""
+    import tomllib  # here: the window's start does not wait for what it does not ask
+    from importlib.metadata import PackageNotFoundError, requires
+
     if (inside() / PROJECT).is_file():
         told = tomllib.loads((inside() / PROJECT).read_text(encoding="utf-8"))["project"]
         return tuple(told["optional-dependencies"][extra] if extra else told["dependencies"])
