@@ -10,8 +10,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+from imgui_bundle import ImVec2, imgui  # before glfw: both must use one libglfw
+
+# isort: split
 import glfw
-from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.document.model import Document
 
