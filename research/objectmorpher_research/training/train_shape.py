@@ -132,8 +132,9 @@ def _quick_numbers(device: torch.device) -> AbstractContextManager[Any]:
 
 
 def _on(batch: Batch, device: torch.device) -> Batch:
-    values = {f.name: getattr(batch, f.name) for f in fields(batch)}
-    return Batch(**{k: v.to(device) if isinstance(v, Tensor) else v for k, v in values.items()})
+    tensors = {f.name: getattr(batch, f.name) for f in fields(batch) if f.name != "phase"}
+    moved = {name: tensor.to(device) for name, tensor in tensors.items()}
+    return replace(batch, **moved)
 
 
 class _State:
