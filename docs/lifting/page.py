@@ -67,10 +67,11 @@ OUTLINES = """## Outlines and newly shown sides
 
 The product alone, on the ten and on ten further solids (`HELD_OUT` in `solids.py`). Nothing was
 chosen on those but for plate and cup, which were looked at while rims and lips were made; the
-lamp's numbers were seen once while free forms were closed at their outline. From when on a thing is
-wholly the plain shape it looks like was chosen on ball, box, brick, mug, ring and robot, and looked
-at on eight of those held out: vase and beaker changed, and gain 0.1 dB. Means over both
-directions of a turn; `make_lifting.py quick NAME ...` prints each turn of one.
+lamp's numbers were seen once while free forms were closed at their outline. How much evidence
+makes a thing wholly the plain shape that it looks like was chosen on ball, box, brick, mug, ring
+and robot. Eight of those held out were looked at afterwards: vase and beaker changed, and gain
+0.1 dB. Means over both directions of a turn; `make_lifting.py quick NAME ...` prints each turn of
+one.
 
 - **Wobble**: the total absolute curvature of the outline over the true one's (evenly resampled,
   smoothed by 1 % of the square root of the area, without the frame). 1 bends as the truth does.
@@ -117,11 +118,10 @@ end of the spoon's bowl is smeared where it covers the cup, and what turns into 
 side is blurred. The horse is a sheet, as it was drawn. What does not look right: the invented fur
 along the cat's cheek is a little darker than the fur beside it, and that at the upper left is
 coarse; the fig in the bowl becomes narrow, and slides at 35; the photographer's back has a grey
-band; the clock, which is blurred, has a double edge, and the cell a hard one where its side turns into
-view; the colour ball, black on black at the frame, has nicks and specks there; the pagoda leans and
-becomes narrow at 35; of the moon a piece of ground is selected, which has a ragged edge. The retina
-is a ball; until its box held all of it, and what closes towards the frame was closed beyond it, it
-had corners.
+band; the clock, which is blurred, has a double edge, and the cell, which is blurred too, a hard one
+where its side turns into view; the colour ball is black on black at the frame, and has nicks and
+specks there; the pagoda leans, and becomes narrow at 35; of the moon a piece of ground is selected,
+which has a ragged edge.
 """
 STEREO = """## A photographed thing whose shape is known
 

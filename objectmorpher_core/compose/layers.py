@@ -93,7 +93,7 @@ def _distinct(document: Document) -> list[EditObject]:
     """The visible objects that were cut out; of copies one, for they are in the same place."""
     found: dict[int, EditObject] = {}
     for item in document.objects:
-        if item.matte is not None and item.is_visible and not item.is_visitor:
+        if item.matte_here is not None and item.is_visible:
             found.setdefault(id(item.matte), item)
     return list(found.values())
 

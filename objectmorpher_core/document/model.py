@@ -255,6 +255,10 @@ class LiftedObject:
         if self.splatting not in SPLATTINGS:
             raise ValueError(f"splatting is {self.splatting!r}, not one of {', '.join(SPLATTINGS)}")
 
+    def photo_camera(self, here: Camera) -> Camera:
+        """The camera of the photo that it carries, where that of the document's photo is `here`."""
+        return here if self.origin is None else self.origin.camera
+
     @cached_property
     def diameter(self) -> float:
         """Largest distance between two control points, object units (paper's D_scene)."""
@@ -416,6 +420,11 @@ class EditObject:
     def is_visitor(self) -> bool:
         """Whether it comes from another photo; its mask is empty then."""
         return self.lifted is not None and self.lifted.origin is not None
+
+    @property
+    def matte_here(self) -> Matte | None:
+        """Its matte, if that is of this photo."""
+        return None if self.is_visitor else self.matte
 
     @property
     def is_moved(self) -> bool:

@@ -42,7 +42,7 @@ class RestSplats:
     def __init__(self, lifted: LiftedObject, camera: Camera) -> None:
         """`camera` is the photo's, unless the object brings its own."""
         self.lifted = lifted
-        self.camera = camera = camera if lifted.origin is None else lifted.origin.camera
+        self.camera = camera = lifted.photo_camera(camera)
         self.splatting: Splatting = SPLATTINGS[lifted.splatting]
         self.world_from_object = lifted.world_from_object
         self.means = frozen(lifted.gaussians.means, np.float64)  # (N, 3) object frame
@@ -58,7 +58,7 @@ class RestSplats:
 
     def carried(self, photo_camera: Camera) -> Camera:
         """Return the camera of the photo that the object carries, by default the document's."""
-        return photo_camera if self.lifted.origin is None else self.camera
+        return self.lifted.photo_camera(photo_camera)
 
     @cached_property
     def is_textured(self) -> bool:

@@ -26,7 +26,7 @@ MOVING = 1 / 255  # of a level, what the frames of a drag miss on average over t
 @pytest.fixture
 def editor(editor: Editor) -> Editor:
     """One that has drawn nothing: how long it took others decides on the size of a draft."""
-    editor.close()
+    editor.tabs.close(editor.tab)
     return editor
 
 

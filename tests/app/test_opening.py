@@ -210,7 +210,7 @@ def test_a_sample_opens_with_its_thing_lifted_and_nothing_to_save(
 def test_what_was_computed_for_a_closed_document_is_let_go(editor: Editor, ball: Document) -> None:
     """A session opened in its place, or none: neither keeps gigabytes alive."""
     other = replace(ball, photo=replace(ball.photo, name="other.png"))
-    for leave in (lambda: editor.start(other), editor.close):
+    for leave in (lambda: editor.start(other), lambda: editor.tabs.close(editor.tab)):
         editor.start(ball)
         wait_for_jobs(editor)
         kept = weakref.ref(editor.derived.shape(ball.photo, ball.objects[0]))

@@ -59,7 +59,7 @@ def test_going_from_tab_to_tab_changes_no_document(tabs: Editor) -> None:
     place = tabs.view.place
     go(tabs, second)
     tabs.view.shown = Shown.DEPTH
-    tabs.source = Path("/photos/other.png")
+    tabs.tab.source = Path("/photos/other.png")
     kept = {tab: facts(tab) for tab in (first, second, third)}
     way = random.Random(3)
     for _ in range(30):

@@ -119,7 +119,7 @@ class Desk:
         then()
 
     def open(self, path: Path) -> Document:
-        self.editor.close()
+        self.editor.tabs.close(self.editor.tab)
         self.editor.filing.open(path)
         self.wait(lambda: None)
         return self.document

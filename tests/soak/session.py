@@ -245,7 +245,7 @@ class Session:
         self.editor.view.tool = ToolName.POSE
 
     def _open(self, path: Path) -> None:
-        self.editor.close()  # what is unsaved is given up
+        self.editor.tabs.close(self.editor.tab)  # what is unsaved is given up
         self.editor.filing.open(path)
         self._wait()
         assert self.editor.history is not None, self.editor.message

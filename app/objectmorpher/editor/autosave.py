@@ -149,7 +149,7 @@ class Autosave:
 
     @property
     def is_up_to_date(self) -> bool:
-        """Whether the disk holds what is unsaved, and nothing else of this editor."""
+        """Whether the disk holds what is unsaved, and nothing else of this tab."""
         is_asked = not self._is_kept if self._tab.is_saved else self._asked is self._tab.document
         return is_asked and self._given == self._done
 

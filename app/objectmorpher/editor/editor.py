@@ -123,7 +123,7 @@ class Editor(EditorState):
         if is_of_another:
             self._forget_derived()
         self.derived.adopt(shapes)
-        self.history = History(document, limit=self.settings.history_mb << 20)
+        self.tab.history = History(document, limit=self.settings.history_mb << 20)
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
         self.view.split, self.view.shown = None, Shown.COMPOSITE
@@ -134,14 +134,10 @@ class Editor(EditorState):
             self.tasks.read_photo()
         self.recovery.offer()
 
-    def close(self) -> None:
-        """Closes the tab; nothing is asked here."""
-        self.tabs.close(self.tab)
-
     def leave(self) -> None:
-        """The tab is not shown any more. What runs for it ends, and what was computed for it goes:
+        """The tab is not shown any more: what runs for it ends, and what was computed for it goes.
 
-        gigabytes, maybe.
+        That may be gigabytes.
         """
         self._stop()
         self.message, self.hover = None, Hover()

@@ -120,9 +120,11 @@ class Filing:
             self._remember(path)
             self._open_next(rest, [*opened, path.name], others)
 
+        def pass_over() -> None:
+            self._open_next(rest, opened, [*others, path.name])
+
         shown = self._tab_of(path)
         if shown is None:
-            pass_over = lambda: self._open_next(rest, opened, [*others, path.name])  # noqa: E731
             self._open(path, go_on, pass_over if rest or opened else None)
         else:
             self._tabs.go(shown, go_on)
@@ -139,7 +141,7 @@ class Filing:
         """Opens a photo that came with the program: it is nobody's file to go back to."""
 
         def start() -> None:
-            self._editor.source = None
+            self._editor.tab.source = None
             then()
 
         self._open(path, start)
@@ -283,8 +285,8 @@ class Filing:
         def accept(answer: tuple[OpenedFile, Path | None, Shapes]) -> None:
             opened, path, shapes = answer
             self._tabs.open(opened.document, shapes)
-            editor.path = path if opened.is_session else None
-            editor.source = None if opened.is_session else path
+            editor.tab.path = path if opened.is_session else None
+            editor.tab.source = None if opened.is_session else path
             then()
 
         def fail(error: JobError) -> None:

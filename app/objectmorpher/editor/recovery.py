@@ -110,7 +110,7 @@ class Recovery:
             document, shapes = answer
             self._forget(left)
             self._tabs.open(document, shapes)
-            editor.path, editor.source = left.path, left.source
+            editor.tab.path, editor.tab.source = left.path, left.source
             assert editor.history is not None
             editor.history.mark_unsaved()
             editor.autosave.adopt(HeldJournal(Journal(left.folder), lock))

@@ -56,27 +56,15 @@ class EditorState:
     def history(self) -> History | None:
         return self.tab.history
 
-    @history.setter
-    def history(self, history: History | None) -> None:
-        self.tab.history = history
-
     @property
     def path(self) -> Path | None:
         """The session's file."""
         return self.tab.path
 
-    @path.setter
-    def path(self, path: Path | None) -> None:
-        self.tab.path = path
-
     @property
     def source(self) -> Path | None:
         """The photo's file."""
         return self.tab.source
-
-    @source.setter
-    def source(self, source: Path | None) -> None:
-        self.tab.source = source
 
     @property
     def current(self) -> int:
@@ -166,7 +154,8 @@ class EditorState:
 
     def forget_document(self) -> None:
         """No document is open."""
-        self.history = self.preview = self.path = self.source = self.message = None
+        self.tab.history = self.tab.path = self.tab.source = None
+        self.preview = self.message = None
         self.hover = Hover()
 
     def apply(self, label: str, document: Document) -> None:

@@ -38,11 +38,6 @@ class Tabs:
         self.aimed: Tab | None = None  # an object that is dragged would be let go on it
         self._ended: list[Autosave] = []  # of tabs that were closed
 
-    @property
-    def unsaved(self) -> tuple[Tab, ...]:
-        """The tabs that hold changes that no file has."""
-        return tuple(tab for tab in self.all if not tab.is_saved)
-
     def open(self, document: Document, shapes: Shapes = ()) -> None:
         """Shows a document that was read: in a new tab, or in the place of the start screen."""
         if self._editor.committed is not None:
@@ -132,7 +127,7 @@ class Tabs:
                 tab.history.limit_to(shared)
 
     def keep_safe(self) -> bool:
-        """Has unsaved work of every tab written, once a frame. Whether anything changed."""
+        """Once a frame: has unsaved work of every tab written. Whether there is a new complaint."""
         return any([tab.autosave.poll(self._editor.complain) for tab in self.all])
 
     def forget_all(self) -> None:

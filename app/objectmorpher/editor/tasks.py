@@ -406,14 +406,9 @@ class Tasks:
                     then()
 
         def fail(error: JobError) -> None:
-            again = (
-                error
-                if editor.tab is not tab
-                else error.retried_by(
-                    lambda: self.save(path, then)  # as it is by then
-                )
-            )
-            editor.complain_of(again)
+            if editor.tab is tab:
+                error = error.retried_by(lambda: self.save(path, then))  # as it is by then
+            editor.complain_of(error)
 
         editor.jobs.start(
             t("Saving {name}", name=path.name), job_functions.write_session, document, path,

@@ -45,12 +45,10 @@ def plate_cover(document: Document) -> Mask:
     width, height = document.photo.size
     covered = np.zeros((height, width), bool)
     for item in document.objects:
-        if item.is_visitor:
-            continue
-        if item.matte is not None:
-            shared = overlap(item.matte.box, (0, 0, width, height))
+        if (matte := item.matte_here) is not None:
+            shared = overlap(matte.box, (0, 0, width, height))
             if shared is not None:
-                own = cut(item.matte.alpha, item.matte.box, shared)
+                own = cut(matte.alpha, matte.box, shared)
                 cut(covered, (0, 0, width, height), shared)[own > 0] = True
         elif item.mask is not None:
             covered |= item.mask

@@ -254,8 +254,8 @@ def _covered(document: Document, box: Box) -> Mask:
     x0, y0, x1, y1 = box
     covered = np.zeros((y1 - y0, x1 - x0), bool)
     for item in document.objects:
-        if item.matte is not None and not item.is_visitor:
-            covered |= crop(item.matte.alpha, item.matte.box, box) > 0
+        if (matte := item.matte_here) is not None:
+            covered |= crop(matte.alpha, matte.box, box) > 0
         elif item.mask is not None:
             covered |= item.mask[y0:y1, x0:x1]
     return covered

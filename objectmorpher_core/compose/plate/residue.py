@@ -220,8 +220,8 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
 def _away(item: EditObject, box: Box) -> F32:
     """(h, w) px of the box to what an object covers."""
     x0, y0, x1, y1 = box
-    if item.matte is not None and not item.is_visitor:
-        own = crop(item.matte.alpha, item.matte.box, box) > 0
+    if (matte := item.matte_here) is not None:
+        own = crop(matte.alpha, matte.box, box) > 0
     elif item.mask is not None:
         own = item.mask[y0:y1, x0:x1]
     else:

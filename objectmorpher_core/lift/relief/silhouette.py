@@ -47,13 +47,14 @@ class ReliefSilhouette:
         extent = float(max(crop.shape))
         cell = max(1.0, extent / GRID)
         # What closes beyond the frame has an outline there.
-        first, last = np.add([top, left], crop.shape) == whole.shape
+        up, down, before, after = extension
+        bottom, right = top + crop.shape[0], left + crop.shape[1]
         is_open = (
-            bool(extension[0] and top == 0), bool(extension[1] and first),
-            bool(extension[2] and left == 0), bool(extension[3] and last),
+            up > 0 and top == 0, down > 0 and bottom == whole.shape[0],
+            before > 0 and left == 0, after > 0 and right == whole.shape[1],
         )  # fmt: skip
         inside = np.pad(_reduced(crop, cell, is_open[1], is_open[3]), 1)
-        corner = (left - extension[2] - cell, top - extension[0] - cell)
+        corner = (left - before - cell, top - up - cell)
         return ReliefSilhouette(inside, cell, *corner, extent, is_open)
 
     @property

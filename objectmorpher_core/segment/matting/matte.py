@@ -92,16 +92,12 @@ def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Sele
         return mask
     top, bottom, left, right = extension
     whole = extended(mask, extension)
-    height, width = whole.shape
-    for axis, near, far in ((0, top, height - bottom), (1, left, width - right)):
-        turned = np.moveaxis(whole, axis, 0)  # a view: both sides are changed in place
-        turned[: near + 1] = _closing(np.minimum.accumulate(turned[near::-1]), turned[near:far])[
-            ::-1
-        ]
-        turned[far - 1 :] = _closing(
-            np.minimum.accumulate(turned[far - 1 :]),
-            turned[far - 1 : near - 1 if near else None : -1],
-        )
+    for axis, before, after in ((0, top, bottom), (1, left, right)):
+        turned = np.moveaxis(whole, axis, 0)  # views: both sides are changed in place
+        for side, near, far in ((turned, before, after), (turned[::-1], after, before)):
+            if near:
+                beyond = np.minimum.accumulate(side[near::-1])
+                side[:near] = _closing(beyond, side[near : len(side) - far])[:0:-1]
     return whole
 
 
@@ -111,13 +107,13 @@ def _closing(beyond: Selection, inner: Selection) -> Selection:
     `inner` (m, w): rows inward, likewise from the frame's own. The square of a conic's chord is a
     parabola over the row.
     """
-    own = is_selected(inner)
+    own = is_selected(inner[: max(LOOKED, len(beyond))])
     ends = np.flatnonzero(np.diff(own[0], prepend=False, append=False)).reshape(-1, 2)
     far = np.arange(len(beyond))
     at = np.arange(own.shape[1])
     kept = np.zeros(beyond.shape, bool)
     for first, last in ends:
-        squares = _chords(own[: max(LOOKED, len(beyond))], int(first), int(last)) ** 2
+        squares = _chords(own, int(first), int(last)) ** 2
         narrower, bent = _parabola(squares)
         chords = np.sqrt(np.maximum(squares[0] - far * (narrower - bent * far), 0.0))
         middle = 0.5 * (first + last - 1)
@@ -126,7 +122,10 @@ def _closing(beyond: Selection, inner: Selection) -> Selection:
 
 
 def _parabola(squares: F64) -> tuple[float, float]:
-    """How `squares` (k,) grow, per step and per step's square: growing, and less and less."""
+    """The parabola from the first of `squares` (k,) through the others: its growth, and its bend.
+
+    Both are 0 where they do not grow; it never bends upwards.
+    """
     steps = np.arange(len(squares), dtype=np.float64)
     if len(steps) < LOOKED:
         return 0.0, 0.0

@@ -213,7 +213,7 @@ def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
     if matte is None:
         return _glb([MeshPart(world, triangles, colors=near.blended(body.colors))], None)
     is_front = seen[triangles].mean(1) > SEEN
-    camera = puppet.camera if lifted.origin is None else lifted.origin.camera
+    camera = lifted.photo_camera(puppet.camera)
     uv = _places_in(matte, camera.project(lifted.world_points(points)))
     parts = [
         _part(world, triangles[is_front], uv=uv),

@@ -27,7 +27,7 @@ def moved(editor: Editor, ball: Document, tmp_path: Path) -> Editor:
     """The ball is lifted and moved; nothing was exported before."""
     editor.settings = Settings(gaussians=3000)
     editor.start(ball)
-    editor.source = tmp_path / "ball.png"
+    editor.tab.source = tmp_path / "ball.png"
     editor.apply("Move object", edits.set_placement(ball, 0, Placement(move=(25.0, -4.0))))
     return editor
 
@@ -78,7 +78,7 @@ def test_an_object_that_was_not_moved_is_cut_out_of_the_photo(
 ) -> None:
     editor.settings = Settings()
     editor.start(ball)
-    editor.source = None
+    editor.tab.source = None
     editor.exporting.open()
     editor.exporting.choose_what(What.CUTOUT)
     assert ball.objects[0].mask is not None
