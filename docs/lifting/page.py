@@ -120,8 +120,8 @@ along the cat's cheek is a little darker than the fur beside it, and that at the
 coarse; the fig in the bowl becomes narrow, and slides at 35; the photographer's back has a grey
 band; the clock, which is blurred, has a double edge, and the cell, which is blurred too, a hard one
 where its side turns into view; the colour ball is black on black at the frame, and has nicks and
-specks there; the pagoda leans, and becomes narrow at 35; of the moon a piece of ground is selected,
-which has a ragged edge.
+specks there; the pagoda leans, becomes narrow at 35, and shows light spots at its left windows; of
+the moon a piece of ground is selected, which has a ragged edge.
 """
 STEREO = """## A photographed thing whose shape is known
 
