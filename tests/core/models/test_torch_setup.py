@@ -14,6 +14,7 @@ import sys
 import time
 import zipfile
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -265,5 +266,5 @@ def test_requirements_of_a_wheel_are_those_of_the_checkout(
     told = [f"{line}{' and' if ';' in line else ';'} extra == 'models'" for line in lines]
     told += installation.requirements("")
     monkeypatch.setenv("OBJECTMORPHER_INSIDE", str(tmp_path))
-    monkeypatch.setattr(installation, "requires", lambda name: told)
+    monkeypatch.setattr(metadata, "requires", lambda name: told)
     assert installation.requirements("models") == lines
