@@ -39,6 +39,7 @@ SLANTS = slice(-len(SLANT_SIGMAS), None)  # of the channels: they change sign in
 # A patch that matches nothing well costs least where it is smooth: by the variance of the texture.
 # Roughness must cost as much, and is less than a third of a texture's deviation in levels.
 ROUGHNESS_WEIGHT = 8.0  # x a colour channel's
+TONE_WEIGHT = 2.0  # x a colour channel's, of each of a tone's
 HOLE_WEIGHT = 0.4  # x a known pixel's, of one that is only guessed, when patches are compared
 TRUST = 1.3  # x less a patch's vote counts for each px that it lies deeper in the hole
 LEAST_TRUST = np.float32(1e-30)  # deep in a hole; less would be no whole float32 any more
@@ -212,12 +213,17 @@ class _Filling:
         self._targets = np.argwhere(self._touched).astype(np.int32)
         mirrored = self.values[:, ::-1].copy()
         mirrored[..., SLANTS] *= -1
-        self._layers = np.stack([self._rimmed(v) for v in (self.values, mirrored)])
+        tone = self._guidance.tone.values
+        self._layers = np.stack(
+            [self._rimmed(self.values, tone), self._rimmed(mirrored, tone[:, ::-1])]
+        )
         self._barred = np.where(self._usable, self._guidance.unlikely, patch_search.NEVER)
         weights = np.full(level.values.shape[2], ROUGHNESS_WEIGHT, np.float32)
         weights[:3] = 1
-        inside = np.pad(np.where(self.hole, np.float32(HOLE_WEIGHT), 1), self._radius)
-        self._weight = inside[..., None] * weights
+        inside = np.where(self.hole, np.float32(HOLE_WEIGHT), 1)[..., None] * weights
+        share = np.float32(TONE_WEIGHT) * self._guidance.tone.share
+        rim = (self._radius, self._radius)
+        self._weight = np.pad(np.dstack([inside, *tone.shape[2] * [share]]), (rim, rim, (0, 0)))
         depth = cv2.distanceTransform(self.hole.astype(np.uint8), cv2.DIST_L2, 5)
         trust = np.maximum(np.float32(TRUST) ** -depth, LEAST_TRUST)
         self._trust = np.asarray(trust, np.float32)
@@ -251,7 +257,8 @@ class _Filling:
     def search(self, rounds: int) -> None:
         """Looks for better sources."""
         guidance = self._guidance
-        pictures = _rows(self._rimmed(self.values)), _rows(self._weight), _rows(self._layers)
+        target = self._rimmed(self.values, guidance.tone.values)
+        pictures = _rows(target), _rows(self._weight), _rows(self._layers)
         wanted, offered = frozen(guidance.wanted), frozen(guidance.offered)
         barred, targets = frozen(self._barred, np.float32), frozen(self._targets)
         patch_search.search(
@@ -266,7 +273,7 @@ class _Filling:
 
     def _let_vote(self, shares: F32) -> None:
         values, shares = self.values.copy(), frozen(shares, np.float32)
-        layers, sources = frozen(self._layers), frozen(self.sources)
+        layers, sources = frozen(self._layers[..., : values.shape[2]]), frozen(self.sources)
         patch_search.vote(layers, sources, shares, frozen(self.hole), values)
         self.values = values
 
@@ -307,9 +314,10 @@ class _Filling:
             row, column = (part[which] for part in np.nonzero(there))
             self.sources[row, column] = own[chosen[which]]
 
-    def _rimmed(self, values: F32) -> F32:
+    def _rimmed(self, values: F32, tone: F32) -> F32:
+        """(h + 2 r, w + 2 r, C + K) of values (h, w, C) and their tone (h, w, K)."""
         rim = (self._radius, self._radius)
-        return np.pad(values, (rim, rim, (0, 0)), mode="edge")
+        return np.pad(np.dstack([values, tone]), (rim, rim, (0, 0)), mode="edge")
 
 
 def _rows(values: F32) -> F32:

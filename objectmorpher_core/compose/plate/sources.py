@@ -19,12 +19,29 @@ MOST_HINTS = 23  # so many bits does a float32 hold exactly
 
 
 @dataclass(frozen=True, eq=False)
+class PatchTone:
+    """What patches keep to beside their look: coarse colours, say, known or wanted of the hole."""
+
+    values: F32  # (h, w, K) levels up to 255
+    share: F32  # (h, w) in [0, 1], how much they count
+
+    def resized(self, width: int, height: int) -> PatchTone:
+        size = width, height
+        values, share = (
+            np.asarray(cv2.resize(field, size, interpolation=cv2.INTER_AREA), np.float32)
+            for field in (self.values, self.share)
+        )
+        return PatchTone(values, share)
+
+
+@dataclass(frozen=True, eq=False)
 class Guide:
     """The guide of one picture (h, w)."""
 
     unlikely: F32  # (h, w) squared levels of 255 that taking a pixel costs
     lines: tuple[Line, ...] = ()
     hints: tuple[Hint, ...] = ()  # the last ones win
+    tone: PatchTone | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +51,7 @@ class PatchGuide:
     wanted: F32  # (h, w, 3)
     offered: F32  # (2, h, w, 3)
     unlikely: F32  # (2, h, w)
+    tone: PatchTone  # of no values where none is asked for
 
 
 def guidance(guide: Guide, hole: Mask) -> PatchGuide:
@@ -55,9 +73,12 @@ def guidance(guide: Guide, hole: Mask) -> PatchGuide:
     unlikely = np.asarray(resized, np.float32)
     mirrored = offered[:, ::-1].copy()
     mirrored[..., :2] = 0  # no line goes on mirrored
-    return PatchGuide(
-        wanted, np.stack([offered, mirrored]), np.stack([unlikely, unlikely[:, ::-1]])
-    )
+    if guide.tone is None:
+        tone = PatchTone(np.empty((height, width, 0), np.float32), unlikely)
+    else:
+        tone = guide.tone.resized(width, height)
+    unlikely = np.stack([unlikely, unlikely[:, ::-1]])
+    return PatchGuide(wanted, np.stack([offered, mirrored]), unlikely, tone)
 
 
 # How unlikely it is that the background behind a hole looks like this or that source.

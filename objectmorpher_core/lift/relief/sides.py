@@ -3,9 +3,11 @@
 An object that is turned far to a side is seen as if its surface were unfolded: what the photo
 shows and what it does not lie side by side, both hardly foreshortened. There the hidden part is a
 hole in a picture, and is filled with patches from beside it, or mirrored ones, along its straight
-edges, as a background is (`compose.plate`). Each Gaussian that the photo does not show, or shows
-from nearly edge on, carries its piece of the picture that faces it most, by the same map that
-carries the photo (DESIGN section 3): it is as sharp, and stays the same however the object turns.
+edges, as a background is (`compose.plate`). They are taken from about as far along the axis of the
+turn, and where about the colours are that the side is to have: hair goes on as hair. Each Gaussian
+that the photo does not show, or shows from nearly edge on, carries its piece of the picture that
+faces it most, by the same map that carries the photo (DESIGN section 3): it is as sharp, and stays
+the same however the object turns.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from ...base.threads import in_threads
 from ...compose.light.lighting import estimate_light
 from ...compose.plate.completion import complete, shrunk, smooth
 from ...compose.plate.patch_detail import with_detail
-from ...compose.plate.sources import Guide
+from ...compose.plate.sources import Guide, PatchTone
 from ...compose.plate.structure_lines import find_lines
 from ...document.model import LiftedObject, Matte, Placement, Sides
 from ...raster import tiles
@@ -36,8 +38,8 @@ from .colours import fill_in
 AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
 # Ratio of the cosines then and now, down to which the photo goes on beyond where it is shown, so
-# that both agree where they meet: of a turn by 17 degrees and more.
-PINNED = 0.2
+# that both agree where they meet: of a turn by 22 degrees and more.
+PINNED = 0.25
 FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
 LONGEST = 400.0  # px, longer side of the object in a picture
@@ -54,6 +56,7 @@ ELSEWHERE = 300.0  # squared levels that one in the photo costs
 KEPT = 0.85  # share of the coarse colours of a side that stays
 COARSE = 5.0  # small px, of what is coarse
 NEARBY = 2.0  # small px, over which colours are compared
+HEIGHT = 300.0  # levels of a patch's tone, from one end of the axis of a turn to the other
 NEARLY = 1.1  # x the share of a picture of about the right colours: what exceeds 1 is whole
 OTHER = 30.0  # levels, by which the coarse colours of a picture of something else are off
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
@@ -70,6 +73,7 @@ class _View:
     camera: Camera  # whose picture holds the object
     places: F64  # (N, 3) world, after the turn
     cosines: F64  # (N,) of the normals with the way to the camera
+    is_pitched: bool  # its axis lies across the picture, not upright
 
     @staticmethod
     def of(rest: RestSplats, camera: Camera, turn: tuple[float, float, float]) -> _View:
@@ -87,7 +91,7 @@ class _View:
             scale * camera.focal, scale * camera.cx - left, scale * camera.cy - top,
             int(width), int(height),
         )  # fmt: skip
-        return _View(motion, own, places, cosines)
+        return _View(motion, own, places, cosines, turn[0] == 0)
 
     @property
     def xy(self) -> F64:
@@ -311,9 +315,12 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     small, share = shrunk(levels, (~whole).astype(np.float32), size)
     guess = smooth(small, (share >= 0.5).astype(np.float32))
     unlikely = _unlikely(known & picture.is_clear, share < 0.5, round(width * scale))
-    guide = Guide(unlikely, find_lines(guess, share < 0.5))
-    completion = complete(small, share, guide, seed, silent)
     coarse = np.asarray(cv2.resize(levels, size, interpolation=cv2.INTER_AREA), np.float32)
+    solid = cv2.resize(picture.is_object.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    tone = np.dstack([cv2.GaussianBlur(coarse, (0, 0), NEARBY), _heights(side, front, size)])
+    kept = PatchTone(np.asarray(tone, np.float32), np.asarray(solid, np.float32))
+    guide = Guide(unlikely, find_lines(guess, share < 0.5), tone=kept)
+    completion = complete(small, share, guide, seed, silent)
     change = cv2.GaussianBlur(coarse - completion.colors, (0, 0), COARSE)
     sure = np.asarray(
         cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA), np.float32
@@ -329,6 +336,21 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     share = np.where(whole, cv2.resize(share, hole.shape[::-1]), 1.0)[..., None]
     filled = np.rint(crop + share * (filled.astype(np.float32) - crop))
     return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
+
+
+def _heights(side: _Side, front: _Picture, size: tuple[int, int]) -> F32:
+    """(h, w) how far along the axis of its turn what a side and the photo's view show lies.
+
+    In levels. A part of an object goes on around it, and not higher or lower.
+    """
+    parts = []
+    for picture in (side.picture, front):
+        height, width = picture.depth.shape
+        rows, columns = np.mgrid[:height, :width].astype(np.float32)
+        parts.append(columns / width if side.view.is_pitched else rows / height)
+    tall = max(len(part) for part in parts)
+    parts = [np.pad(part, ((0, tall - len(part)), (0, 0)), mode="edge") for part in parts]
+    return np.asarray(HEIGHT * cv2.resize(np.concatenate(parts, 1), size), np.float32)
 
 
 def _alike(colors: F32, wanted: F32, known: F32, sure: F32) -> F64:

@@ -12,10 +12,16 @@ import skimage.data
 from objectmorpher_core.base.arrays import frozen
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose import load
-from objectmorpher_core.compose.plate.completion import smooth
+from objectmorpher_core.compose.plate.completion import complete, smooth
 from objectmorpher_core.compose.plate.patch_search import patch_cost, vote
 from objectmorpher_core.compose.plate.plate import build_plate, plate_cover, plate_picture
-from objectmorpher_core.compose.plate.sources import SUBJECT_COST, strange, unlikely
+from objectmorpher_core.compose.plate.sources import (
+    SUBJECT_COST,
+    Guide,
+    PatchTone,
+    strange,
+    unlikely,
+)
 from objectmorpher_core.compose.plate.structure_lines import draw_lines, find_lines
 from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment.salience import SubjectNet
@@ -224,3 +230,23 @@ def test_the_grain_of_a_table_goes_on_along_itself(coffee):
     hole = np.hypot((x - 285) / 225, (y - 225) / 215) < 1
     inner = np.hypot((x - 275) / 145, (y - 155) / 115) < 1
     assert _slant(filled(coffee, hole), inner) > 0.35
+
+
+def test_a_tone_that_is_wanted_decides_between_textures():
+    """Beside the hole is lit gravel alone; its right half is to be as dark as gravel far off."""
+    grey = skimage.data.gravel()[100:196, 100:260].astype(np.float32)
+    grey[:, 112:] *= 0.35
+    y, x = np.indices(grey.shape)
+    hole = (np.abs(y - 48) < 16) & (np.abs(x - 48) < 16)
+    wanted = cv2.GaussianBlur(grey, (0, 0), 4)
+    wanted[hole & (x > 48)] *= 0.35
+    known, picture = (~hole).astype(np.float32), np.repeat(grey[..., None], 3, 2)
+    tone = PatchTone(np.repeat(wanted[..., None], 3, 2), np.ones_like(grey))
+    means = []
+    for kept in (None, tone):
+        guide = Guide(np.zeros_like(grey), tone=kept)
+        colors = complete(picture * known[..., None], known, guide, 0, silent).colors
+        means.append([colors[hole & side].mean() for side in (x < 44, x > 52)])
+    lit, dark = grey[~hole & (x < 112)].mean(), grey[:, 116:].mean()
+    assert min(means[0]) > 0.8 * lit and means[1][0] > 0.8 * lit
+    assert means[1][1] < 0.5 * (lit + dark)
