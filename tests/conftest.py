@@ -135,22 +135,6 @@ LONG = (  # files and folders of which a test takes long: they begin
 )  # fmt: skip
 
 
-# Their files know together what networks made of the photos: one process runs them.
-TOGETHER = ("tests/core/segment",)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    from xdist.scheduler.loadfile import LoadFileScheduling
-
-    class ByFiles(LoadFileScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            file = super()._split_scope(nodeid)
-            return next((folder for folder in TOGETHER if nodeid.startswith(folder)), file)
-
-    return ByFiles(config, log) if config.getoption("dist") == "loadfile" else None
-
-
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: next((k for k, n in enumerate(LONG) if n in item.nodeid), 99))
     path = config.getoption("--without")
