@@ -13,14 +13,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: ARCHITECTURE section 8
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # those of PyTorch wait busily for each other
 
+import numpy as np
+
 from objectmorpher_core.base.progress import silent
-from tests import photos
+from tests import photos, remembered
 
 
 def _photo_fixture(name: str):
@@ -32,6 +33,21 @@ def _photo_fixture(name: str):
 
 
 chelsea, coffee, astronaut, rocket, flower, china = map(_photo_fixture, photos.NAMES)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def remembered_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Where the processes of this run keep what networks say: see `tests/remembered.py`."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "remembered"
+    folder.mkdir(exist_ok=True)
+    os.environ[remembered.FOLDER] = str(folder)
+
+
+@pytest.fixture
+def afresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Networks run in this process whatever is remembered: for tests of them and of their time."""
+    monkeypatch.delenv(remembered.FOLDER)
 
 
 _known: dict[bytes, tuple[Any, ...]] = {}  # what `lifted_once` remembers: see `_remembering`
@@ -117,22 +133,6 @@ LONG = (  # files and folders of which a test takes long: they begin
     "test_worker", "test_window", "test_first_use", "test_refin", "app/editing", "app/tools",
     "tests/app", "core/compose",
 )  # fmt: skip
-
-
-# Their files know together what networks made of the photos: one process runs them.
-TOGETHER = ("tests/core/segment",)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    from xdist.scheduler.loadfile import LoadFileScheduling
-
-    class ByFiles(LoadFileScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            file = super()._split_scope(nodeid)
-            return next((folder for folder in TOGETHER if nodeid.startswith(folder)), file)
-
-    return ByFiles(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -35,9 +35,12 @@ from objectmorpher_core.document.model import (
 )
 from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import lift_mask
+from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
+from objectmorpher_core.raster.reference_layers import Picture3D
 from objectmorpher_core.raster.texture import TextureLevels, build_levels
 from objectmorpher_core.segment.matting.matte import extended_mask, frame_extension
+from tests import remembered
 
 WIDTH, HEIGHT = 160, 120  # px, of the made photos
 PLACEMENTS = {  # of an object that is drawn
@@ -338,8 +341,11 @@ def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
     """`inside` of the photo `pixels` lifted by the relief, to about `count` Gaussians."""
     height, width = inside.shape
     view = camera(width, height)
-    matte, lifted = lift_mask(
-        pixels, view, inside, "relief", LiftSettings(count, trust=0), seed=seed
+    settings = LiftSettings(count, trust=0)
+    said = repr(("lifted scene", inside.shape, count, seed)).encode()
+    matte, lifted = remembered.once(
+        said + pixels.tobytes() + inside.tobytes(),
+        lambda: lift_mask(pixels, view, inside, "relief", settings, seed=seed),
     )
     texture = object_texture(matte, lifted)
     puppet = Puppet(lifted, DeformSettings(), view)
@@ -357,6 +363,19 @@ def scene(name: str = "ellipse", count: int = 800, seed: int = 0) -> Scene:
     """The lifted object of one of MASKS in a made photo."""
     inside = mask(name)
     return lifted_scene(picture(inside, seed), inside, count, seed)
+
+
+def placed(placement: str, scene: Scene) -> PosedSplats:
+    """The object at rest in one of PLACEMENTS, or "around the camera"."""
+    return scene.puppet.posed(None, PLACEMENTS.get(placement) or around_the_camera(scene))
+
+
+def specified(item: Scene, placement: str, view: Camera) -> Picture3D:
+    """What the specification draws of a `scene` in a `view`: by one process of a run."""
+    of = (item.pixels, item.mask, item.lifted.gaussians.means)
+    said = repr(("placed", placement, view)).encode() + b"".join(part.tobytes() for part in of)
+    splats = placed(placement, item)
+    return remembered.once(said, lambda: reference.render(splats, item.texture, view, item.camera))
 
 
 # ---- clouds of Gaussians of every kind ------------------------------------------------------
@@ -404,6 +423,15 @@ def random_splats(
     noise[..., 3] = np.clip((noise[..., 3] - 0.4) * 5, 0, 1)
     splats = PosedSplats(RestSplats(lifted, camera()), Skinned(means, linear), np.eye(4))
     return splats, build_levels(noise[..., :3], noise[..., 3], 0, 0)
+
+
+def specified_random(seed: int, splatting: str = "surface", is_textured: bool = True) -> Picture3D:
+    """What the specification draws of `random_splats`: by one process of a run."""
+
+    def draw() -> Picture3D:
+        return reference.render(*random_splats(seed, splatting, is_textured), camera(), camera())
+
+    return remembered.once(repr(("random", seed, splatting, is_textured)).encode(), draw)
 
 
 def two_discs(front_opacity: float) -> tuple[PosedSplats, TextureLevels, tuple[float, float]]:

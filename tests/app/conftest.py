@@ -16,11 +16,13 @@ from PIL import Image
 
 import hands
 from editor_steps import close_all, lift_ball, made_photo, open_file, wait_until
+from objectmorpher.editor import state
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
 from objectmorpher.editor.view import ViewState
 from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.document.model import Document
+from tests import remembered
 
 try:
     import fcntl
@@ -30,6 +32,7 @@ except ImportError:
 if TYPE_CHECKING:
     from desk import Desk
 
+state.WARM = (*state.WARM, remembered.__name__)  # for the worker processes, too
 CANVAS = ((720, 560), 1.0, None)
 
 
@@ -83,11 +86,15 @@ def ball(
     shared_editor: Editor, photo_bytes: bytes, tmp_path_factory: pytest.TempPathFactory
 ) -> Document:
     """The made photo's document, its ball lifted and with a background behind it."""
-    path = tmp_path_factory.mktemp("ball") / "ball.png"
-    path.write_bytes(photo_bytes)
-    close_all(shared_editor)
-    open_file(shared_editor, path)
-    return lift_ball(shared_editor)
+
+    def lift() -> Document:
+        path = tmp_path_factory.mktemp("ball") / "ball.png"
+        path.write_bytes(photo_bytes)
+        close_all(shared_editor)
+        open_file(shared_editor, path)
+        return lift_ball(shared_editor)
+
+    return remembered.once(b"the lifted ball", lift)
 
 
 @pytest.fixture

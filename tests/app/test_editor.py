@@ -232,8 +232,8 @@ def test_the_editor_needs_no_window_and_no_heavy_modules() -> None:
     assert result.stdout.strip() == "[]"
 
 
-def test_a_held_drag_comes_to_rest_and_is_then_left_alone(editor: Editor) -> None:
-    lift_ball(editor)
+def test_a_held_drag_comes_to_rest_and_is_then_left_alone(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
     start = canvas_xy(editor, 90, 50)
     handle = editor.posing.start_handle(start, is_pin=False)
     assert handle is not None
@@ -249,8 +249,10 @@ def test_a_held_drag_comes_to_rest_and_is_then_left_alone(editor: Editor) -> Non
     editor.commit("")
 
 
-def test_a_click_beside_a_handle_on_its_control_point_is_no_step(editor: Editor) -> None:
-    lift_ball(editor)
+def test_a_click_beside_a_handle_on_its_control_point_is_no_step(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
     start = canvas_xy(editor, 90, 50)
     drag(editor, start, canvas_xy(editor, 110, 40))
     document, thing = editor.document, editor.object

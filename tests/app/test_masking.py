@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from editor_steps import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
+from editor_steps import CENTRE, HEIGHT, WIDTH, wait_for_jobs, wait_until
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
@@ -466,8 +466,11 @@ def test_a_click_again_asks_for_more_or_less_around_it(editor: Editor) -> None:
 
 
 @pytest.mark.slow
-def test_masks_of_two_objects_are_painted_and_undone_each_on_its_own(editor: Editor) -> None:
-    first = lift_ball(editor)
+def test_masks_of_two_objects_are_painted_and_undone_each_on_its_own(
+    editor: Editor, ball: Document
+) -> None:
+    first = ball
+    editor.start(ball)
     editor.objects.start_another()
     paint(editor, FAR)
     assert editor.document is not None and editor.current == 1

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from editor_steps import CENTRE, lift_ball, wait_for_jobs
+from editor_steps import CENTRE, wait_for_jobs
 from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Painted, Selecting, ToolName
@@ -16,7 +16,7 @@ from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher_core import splat_files
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import LiftedObject, Placement
+from objectmorpher_core.document.model import Document, LiftedObject, Placement
 from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import stroke
 from tests import shapes
@@ -46,8 +46,8 @@ def paint(editor: Editor, kind: Painted, *places: tuple[float, float], **held: b
     wait_for_jobs(editor)
 
 
-def test_the_thickness_is_live_and_one_step(editor: Editor) -> None:
-    lift_ball(editor)
+def test_the_thickness_is_live_and_one_step(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
     document, before = editor.document, depth_range(editor)
     for share in (1.2, 1.5, 0.5):
         editor.shaping.preview_thickness(share)
@@ -62,8 +62,8 @@ def test_the_thickness_is_live_and_one_step(editor: Editor) -> None:
 
 
 @pytest.mark.slow
-def test_a_posed_object_stays_posed_when_it_becomes_thicker(editor: Editor) -> None:
-    lift_ball(editor)
+def test_a_posed_object_stays_posed_when_it_becomes_thicker(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
     assert editor.document is not None
     here = editor.posing.surface_at(editor.view.canvas_from_image(np.array(CENTRE)))
     assert here is not None
@@ -87,8 +87,8 @@ def test_a_posed_object_stays_posed_when_it_becomes_thicker(editor: Editor) -> N
 
 
 @pytest.mark.slow
-def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor) -> None:
-    lift_ball(editor)
+def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
     first = lifted_of(editor)
     editor.shaping.say("Other side", back="mirrored")
     wait_for_jobs(editor)
@@ -101,8 +101,10 @@ def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor) -> None:
 
 
 @pytest.mark.slow
-def test_a_kind_is_a_step_the_worker_makes_it_and_a_session_keeps_it(editor: Editor) -> None:
-    lift_ball(editor)
+def test_a_kind_is_a_step_the_worker_makes_it_and_a_session_keeps_it(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
     before = depth_range(editor)
     assert editor.shaping.recognised_as == "round", "it is a ball"
     editor.shaping.say("Kind of shape", kind="flat")
@@ -117,8 +119,8 @@ def test_a_kind_is_a_step_the_worker_makes_it_and_a_session_keeps_it(editor: Edi
 
 
 @pytest.mark.slow
-def test_what_is_painted_nearer_comes_nearer(editor: Editor) -> None:
-    lift_ball(editor)
+def test_what_is_painted_nearer_comes_nearer(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
     x, y = CENTRE
     paint(editor, Painted.DEPTH, (x, y), (x + 4, y))
     nearness = editor.shaping.settings.nearness
@@ -156,8 +158,8 @@ def test_words_before_the_lift_count_at_the_lift(editor: Editor) -> None:
 
 
 @pytest.mark.slow
-def test_escape_takes_a_painted_stroke_back(editor: Editor) -> None:
-    lift_ball(editor)
+def test_escape_takes_a_painted_stroke_back(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
     document = editor.document
     editor.view.selecting.painted = Painted.HIDDEN
     assert editor.shaping.start_stroke(is_inverse=False)
@@ -219,12 +221,12 @@ def test_placed_by_hand_it_is_fitted_from_there(editor: Editor, figure: Path) ->
 
 @pytest.mark.parametrize("name", ["missing.glb", "damaged.ply"])
 def test_a_bad_file_is_a_sentence_and_nothing_is_lost(
-    editor: Editor, tmp_path: Path, name: str
+    editor: Editor, ball: Document, tmp_path: Path, name: str
 ) -> None:
     path = tmp_path / name
     if name.startswith("damaged"):
         path.write_bytes(b"ply\nnothing")
-    lift_ball(editor)
+    editor.start(ball)
     document = editor.document
     editor.shaping.open_file(path)
     wait_for_jobs(editor)

@@ -13,6 +13,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Handle, Pose
 from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats
+from objectmorpher_core.raster.reference_layers import Picture3D
 from objectmorpher_core.raster.texture import TextureLevels
 from tests import shapes
 
@@ -28,7 +29,11 @@ def rendered(splat_pass: Any, *view: Any) -> F32:
 
 def specified(*view: Any) -> F32:
     """The same by `raster/reference.py`."""
-    picture = reference.render(*view)
+    return premultiplied(reference.render(*view))
+
+
+def premultiplied(picture: Picture3D) -> F32:
+    """(h, w, 4) a drawn object's colours and alpha."""
     return np.dstack([picture.color, picture.alpha])
 
 

@@ -14,7 +14,7 @@ import pytest
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import reference
 from tests import shapes
-from tests.app.render.pictures import bent, pixels_of, rendered, specified
+from tests.app.render.pictures import bent, pixels_of, premultiplied, rendered, specified
 from tests.tree import quick
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
@@ -47,7 +47,7 @@ def difference(splat_pass, *view) -> float:
 @pytest.mark.parametrize("zoom", ZOOMS)
 @pytest.mark.parametrize("name", quick(["star", "frame", "ellipse", "thin"], 2))
 def test_at_rest(splat_pass, name, zoom):
-    scene = shapes.scene(name, 2000)
+    scene = shapes.scene(name)
     camera = scene.camera.windowed(*ZOOMS[zoom])
     splats = scene.puppet.posed(None, Placement())
     assert difference(splat_pass, splats, scene.texture, camera, scene.camera) <= REST
@@ -55,10 +55,11 @@ def test_at_rest(splat_pass, name, zoom):
 
 @pytest.mark.parametrize("placement", [*PLACEMENTS, "around the camera"])
 def test_placed(splat_pass, placement):
-    scene = shapes.scene("star", 800)
-    around = shapes.around_the_camera(scene)
-    splats = scene.puppet.posed(None, PLACEMENTS.get(placement, around))
-    assert difference(splat_pass, splats, scene.texture, scene.camera, scene.camera) <= PIXEL
+    scene = shapes.scene("star", 250)
+    splats, camera = shapes.placed(placement, scene), scene.camera
+    drawn = rendered(splat_pass, splats, scene.texture, camera, camera)
+    expected = premultiplied(shapes.specified(scene, placement, camera))
+    assert np.abs(drawn - expected).max() <= PIXEL
 
 
 @pytest.mark.parametrize(("largeness", "turn"), quick(
@@ -70,7 +71,7 @@ def test_placed(splat_pass, placement):
 )
 def test_bent(splat_pass, zoom, turn, largeness):
     """A pixel in which two Gaussians are as deep as each other may show either in front."""
-    scene, pose = bent("star", 1200, largeness)
+    scene, pose = bent("star", 800, largeness)
     camera = scene.camera.windowed(*ZOOMS[zoom])
     pitch, yaw, roll = turn
     views = [
@@ -89,7 +90,9 @@ def test_bent(splat_pass, zoom, turn, largeness):
 def test_gaussians_of_every_kind(splat_pass, splatting, is_textured, seed):
     splats, texture = shapes.random_splats(seed, splatting, is_textured)
     camera = shapes.camera()
-    assert difference(splat_pass, splats, texture, camera, camera) <= PIXEL
+    drawn = rendered(splat_pass, splats, texture, camera, camera)
+    expected = premultiplied(shapes.specified_random(seed, splatting, is_textured))
+    assert np.abs(drawn - expected).max() <= PIXEL
 
 
 @pytest.mark.parametrize("seed", quick(range(4), 2))
@@ -108,12 +111,15 @@ def test_gaussians_of_every_kind_from_afar(splat_pass, splatting, is_textured, s
 def test_what_else_is_known_of_a_pixel(splat_pass, splatting):
     camera = shapes.camera()
     if splatting == "star":
-        scene, pose = bent("star", 1200, 0.5)
+        scene, pose = bent("star", 800, 0.5)
         splats, texture = scene.puppet.posed(pose, Placement()), scene.texture
     else:
         splats, texture = shapes.random_splats(2, splatting)
     detail = pixels_of(splat_pass.draw(splats, texture, camera, camera).detail)
-    picture = reference.render(splats, texture, camera, camera)
+    picture = (
+        reference.render(splats, texture, camera, camera) if splatting == "star"
+        else shapes.specified_random(2, splatting)
+    )  # fmt: skip
     depth, shift = detail[..., 0], detail[..., 2:]
     seen = depth > 0
     # At a few pixels a layer is just visible, or half of alpha is just reached, or just not.
@@ -135,7 +141,7 @@ def test_a_painted_object_shows_its_colours(splat_pass):
 def test_a_picture_larger_than_the_targets_is_drawn_in_bands(splat_pass, monkeypatch):
     from objectmorpher.render import layered_pass
 
-    scene = shapes.scene("star", 800)
+    scene = shapes.scene("star")
     splats = scene.puppet.posed(None, Placement(turn=(35.0, -20.0, 15.0)))
     view = (splats, scene.texture, scene.camera, scene.camera)
     whole = rendered(splat_pass, *view)
@@ -150,7 +156,7 @@ def test_a_picture_larger_than_the_targets_is_drawn_in_bands(splat_pass, monkeyp
 def test_twice_the_same_picture(splat_pass, splatting, is_textured):
     splats, texture = shapes.random_splats(0, splatting, is_textured)
     view = (splats, texture, shapes.camera(), shapes.camera())
-    first, other = rendered(splat_pass, *view), shapes.scene("star", 800)
+    first, other = rendered(splat_pass, *view), shapes.scene("star")
     rendered(splat_pass, other.puppet.posed(None, Placement()), other.texture, *view[2:])
     np.testing.assert_array_equal(rendered(splat_pass, *view), first)
 

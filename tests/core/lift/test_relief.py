@@ -24,6 +24,7 @@ from tests.core.lift.standing_things import Box, View
 from tests.tree import quick
 
 PIXEL = 1e-3  # px: u0 and means are float32
+COUNT = 3000  # Gaussians of each mask: one lift for all that is seen of it
 
 masks = pytest.mark.parametrize("name", shapes.MASKS)
 
@@ -47,14 +48,14 @@ def _heights(scene: shapes.Scene) -> np.ndarray:
 
 @masks
 def test_every_gaussian_is_seen_in_the_photo_where_its_texture_says(name):
-    scene = shapes.scene(name)
+    scene = shapes.scene(name, COUNT)
     world = scene.lifted.world_points(scene.lifted.gaussians.means.astype(np.float64))
     assert np.abs(scene.camera.project(world) - scene.lifted.texture.u0).max() < PIXEL
 
 
 @masks
 def test_the_object_frame_is_centred_and_one_unit_large(name):
-    lifted = shapes.scene(name).lifted
+    lifted = shapes.scene(name, COUNT).lifted
     low, high = lifted.gaussians.means.min(0), lifted.gaussians.means.max(0)
     assert np.abs(low + high).max() < 1e-5
     assert (high - low).max() == pytest.approx(1, abs=1e-5)
@@ -64,7 +65,7 @@ def test_the_object_frame_is_centred_and_one_unit_large(name):
 
 @masks
 def test_it_has_a_front_a_back_and_a_brim(name):
-    scene = shapes.scene(name)
+    scene = shapes.scene(name, COUNT)
     texture = scene.lifted.texture
     body = texture.solidity > 0.5
     front, back = body & (texture.visibility > 0.5), body & (texture.visibility < 0.5)
@@ -79,7 +80,7 @@ def test_it_has_a_front_a_back_and_a_brim(name):
 
 @masks
 def test_the_front_faces_the_camera_and_the_back_does_not(name):
-    scene = shapes.scene(name)
+    scene = shapes.scene(name, COUNT)
     lifted, texture = scene.lifted, scene.lifted.texture
     world = lifted.world_points(lifted.gaussians.means.astype(np.float64))
     cosine = -(lifted.gaussians.normals * world).sum(1) / np.linalg.norm(world, axis=1)
@@ -91,7 +92,7 @@ def test_the_front_faces_the_camera_and_the_back_does_not(name):
 
 @masks
 def test_front_and_back_are_mirror_images_about_the_middle_sheet(name):
-    scene = shapes.scene(name, 2000)
+    scene = shapes.scene(name, COUNT)
     height = _heights(scene)
     body = scene.lifted.texture.solidity > 0.5
     front, back = height[body & (height > 0)], -height[body & (height < 0)]
@@ -101,7 +102,7 @@ def test_front_and_back_are_mirror_images_about_the_middle_sheet(name):
 @masks
 def test_there_are_no_spikes_at_the_rim(name):
     """Nowhere is the body thicker than the silhouette's width there allows."""
-    scene = shapes.scene(name, 3000)
+    scene = shapes.scene(name, COUNT)
     height, u0 = np.abs(_heights(scene)), scene.lifted.texture.u0
     column, row = np.floor(u0).astype(int).T
     is_in = (column >= 0) & (column < 160) & (row >= 0) & (row < 120)
@@ -214,7 +215,7 @@ def test_an_unknown_lifter_is_refused_by_name():
 
 @masks
 def test_the_brim_lies_in_the_middle_sheet(name):
-    scene = shapes.scene(name)
+    scene = shapes.scene(name, COUNT)
     brim = scene.lifted.texture.solidity < 0.5
     assert np.abs(_heights(scene)[brim]).max() < 1e-3  # px
 
@@ -222,7 +223,7 @@ def test_the_brim_lies_in_the_middle_sheet(name):
 @masks
 def test_the_middle_sheet_changes_as_it_says(name):
     """Depth and slope of neighbours agree: they are of one sheet."""
-    lifted = shapes.scene(name).lifted
+    lifted = shapes.scene(name, COUNT).lifted
     assert lifted.middle is not None
     middle, u0 = lifted.middle.astype(np.float64), lifted.texture.u0.astype(np.float64)
     pairs = cKDTree(u0).query_pairs(4.0, output_type="ndarray")
@@ -251,7 +252,7 @@ def test_a_box_has_walls_and_a_back_of_its_own():
 
 @pytest.mark.parametrize("name", [name for name in shapes.MASKS if name != "frame"])
 def test_what_is_round_has_hardly_any_walls(name):
-    texture = shapes.scene(name, 3000).lifted.texture
+    texture = shapes.scene(name, COUNT).lifted.texture
     outline = ReliefSilhouette.of(shapes.mask(name))
     body = ReliefBody.of(outline, shapes.camera(), LiftSettings())
     middles, _ = outline.contour

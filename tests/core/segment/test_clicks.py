@@ -41,10 +41,15 @@ def steps(name: str) -> list[Step]:
     """What three clicks of the simulated user give."""
     each = truth(name)
     rgb, known = photo(each.photo), embedding(each.photo)
-    return use(
+    found = use(
         lambda prompt: dino().segment(rgb, prompt, known, silent),
         truth_mask(name), 3, each.kind == "part",
     )  # fmt: skip
+    sure[name] = [dino().confidence(rgb, step.prompt, known) for step in found]
+    return found
+
+
+sure: dict[str, list[float | None]] = {}  # of those steps: told while the photo is the last one
 
 
 # The truth ------------------------------------------------------------------------------------
@@ -265,10 +270,8 @@ def test_a_thin_thing_is_not_lost_at_its_edges():
 def test_it_is_less_sure_of_what_is_less_right():
     told, true = [], []
     for name in FEW:
-        each = truth(name)
-        for step in steps(name):
-            rgb, known = photo(each.photo), embedding(each.photo)
-            sureness = dino().confidence(rgb, step.prompt, known)
+        each, found = truth(name), steps(name)
+        for step, sureness in zip(found, sure[name], strict=True):
             assert sureness is not None
             assert 0 <= sureness <= 1
             if each.kind == "whole" or step.prompt.level == "part":
@@ -283,12 +286,10 @@ def test_it_is_less_sure_of_what_is_less_right():
 def test_most_bad_masks_are_told_and_few_good_ones_are_doubted():
     doubted: dict[bool, list[bool]] = {True: [], False: []}  # by whether the mask is bad
     for each in (*TRUTHS, *LATER):
-        rgb, known = photo(each.photo), embedding(each.photo)
-        for step in steps(each.name):
+        for step, told in zip(steps(each.name), sure[each.name], strict=True):
             if each.kind == "whole" or step.prompt.level == "part":
-                sure = dino().confidence(rgb, step.prompt, known)
-                assert sure is not None
-                doubted[step.iou < BAD].append(sure < segment.UNSURE)
+                assert told is not None
+                doubted[step.iou < BAD].append(told < segment.UNSURE)
     assert np.mean(doubted[True]) >= 0.6  # of eight
     assert np.mean(doubted[False]) <= 0.25
 
@@ -307,6 +308,7 @@ def test_how_sure_it_is_costs_nothing_after_the_mask():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("afresh")
 def test_a_click_on_an_encoded_photo_is_much_faster_than_encoding():
     start = time.process_time()
     fresh = dino().encode(photo("coins"), silent)
@@ -331,6 +333,7 @@ def test_a_small_thing_in_a_large_photo_is_found_in_its_tile():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("afresh")
 def test_a_glance_is_told_better_by_a_closer_look_and_then_is_the_same():
     backend, rgb = segment.load("dino"), photo("camera")
     assert isinstance(backend, segment.Quick)
