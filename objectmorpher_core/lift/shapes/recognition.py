@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import F64
 from ...base.camera import Camera
-from ...base.poisson_disk import nearest_in
+from ..relief.canvas import carried_on
 from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
 from .boxes import fit_box, fit_flat
@@ -18,6 +18,7 @@ from .evidence import Evidence, Misfit
 from .round import fit_ellipsoid, fit_revolution, fit_ring
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
+BEYOND = 2.0  # cells from a shape's own outline, up to which its sides go on
 REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside it
 # Of a shape's description: outline, depth and normals, each 1 where it is as far off as expected;
 # what of the mask it leaves out; and that a surface of revolution may have any profile. The outline
@@ -70,8 +71,10 @@ class Recognised:
         if not met.any():
             ones = np.ones(outline.shape)
             return PlacedShape(ones, ones, 0 * ones, 0.0)
-        nearest = nearest_in(met)
-        near, far = (1 / field.ravel()[nearest] for field in (seen.near, seen.far))
+        low, high = 0.5 * float(seen.far[met].min()), 2 * float(seen.near[met].max())
+        near, far = (
+            1 / carried_on(field, met, BEYOND).clip(low, high) for field in (seen.near, seen.far)
+        )
         gap = cv2.distanceTransform((~met).astype(np.uint8), cv2.DIST_L2, 3) * outline.cell
         share = np.clip(2 - gap / (REACH * outline.extent), 0, 1)
         return PlacedShape(near, far, share, weight)
