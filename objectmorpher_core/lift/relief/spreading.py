@@ -126,17 +126,23 @@ class SurfacePoints:
 
 
 def spread(
-    body: ReliefBody, count: int, matte: Matte, band: float, rng: np.random.Generator
+    body: ReliefBody,
+    count: int,
+    band: float,
+    rng: np.random.Generator,
+    matte: Matte | None = None,
 ) -> tuple[SurfacePoints, float]:
     """About `count` points and their mean spacing in px.
 
-    The `matte` tells where exactly the outline is, and covers something as far as `band` px outside
-    the silhouette.
-    Candidates are drawn in proportion to the true area, then thinned to one spacing in 3D.
+    `band`: how far outside the silhouette the matte covers something, px. The `matte` tells where
+    exactly the outline is. Candidates are drawn in proportion to the true area, then thinned to one
+    spacing in 3D.
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
-    outline, ends = body.silhouette, []
-    lines = [_at_half(line, outline, matte) for line in rim_lines(outline.inside)]
+    outline = body.silhouette
+    lines, ends = rim_lines(outline.inside), []
+    if matte is not None:
+        lines = [_at_half(line, outline, matte) for line in lines]
     if body.behind is not None:
         ends = rim_lines(body.behind.stands)
     total = sum(area.sum() for area in areas) + _wall_area(body, lines) + _inner_area(body)
