@@ -82,11 +82,11 @@ def carried_on(field: F64, known: Mask, reach: float) -> F64:
     y, x = np.mgrid[:height, :width] - 0.5 * np.array([[[height]], [[width]]])
     weight, values = known.astype(np.float64), np.where(known, field, 0.0)
 
-    def mean(sums: F64) -> F64:
-        return np.asarray(cv2.GaussianBlur(sums, (0, 0), NEARBY), np.float64) / total
+    total = np.maximum(cv2.GaussianBlur(weight, (0, 0), NEARBY), 1e-12)
 
-    total = np.ones(known.shape)
-    total = np.maximum(mean(weight), 1e-12)
+    def mean(part: F64) -> F64:
+        return np.asarray(cv2.GaussianBlur(part, (0, 0), NEARBY), np.float64) / total
+
     across, down, middle = mean(weight * x), mean(weight * y), mean(values)
     xx, yy = (mean(weight * p * p) - q * q + LEAST_SPREAD for p, q in ((x, across), (y, down)))
     xy = mean(weight * x * y) - across * down

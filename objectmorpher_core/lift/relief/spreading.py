@@ -216,16 +216,17 @@ def _draw(outline: ReliefSilhouette, expected: F64, rng: np.random.Generator) ->
 
 
 def _is_within(xy: F64, lines: list[RimLine], outline: ReliefSilhouette, depth: float) -> Mask:
-    """Which photo px (N, 2) are at least `depth` px inside the lines, and not only in a cell."""
+    """Which photo px (N, 2) are `depth` px inside the lines, or half of what there is of a hair."""
     found = np.ones(len(xy), bool)
     if not lines:
         return found
-    away = bilinear(outline.depth, outline.grid_xy(xy))
+    away, radius = bilinear(np.stack([outline.depth, outline.radius], -1), outline.grid_xy(xy)).T
     near = np.flatnonzero(away < depth + 2 * outline.cell)
     rim = outline.photo_xy(np.concatenate([line.xy for line in lines]))
     _, nearest = KDTree(rim).query(xy[near])
     inward = np.concatenate([line.inward for line in lines])[nearest]
-    found[near] = ((xy[near] - rim[nearest]) * inward).sum(1) > depth
+    inside = ((xy[near] - rim[nearest]) * inward).sum(1)
+    found[near] = inside >= np.minimum(depth, 0.5 * radius[near])
     return found
 
 
@@ -306,7 +307,9 @@ def _wall(body: ReliefBody, lines: list[RimLine], spacing: float) -> SurfacePoin
     points, order = np.column_stack([xy, height]), np.arange(len(xy))
     kept = thin_to_spacing(points, spacing * np.sqrt(PACKING), order)
     xy, height, outward = xy[kept], height[kept], outward[kept]
-    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)  # 0 at the tip of a hair
+    sure = outward / np.maximum(length, 1e-9)
+    outward = np.where(length > 1e-6, sure, body.silhouette.outward(xy))
     normals = np.column_stack([outward, np.zeros(len(xy))])
     no = np.zeros(len(xy), bool)
     return SurfacePoints(xy, height, normals, no, no, no, xy)
