@@ -32,7 +32,8 @@ def test_a_corner_stays_one():
 def test_a_straight_edge_has_no_stairs_where_the_matte_knows_it_exactly():
     corners, fine = np.array([[60, 50], [255, 72], [240, 200], [45, 178]]), 16
     drawn = cv2.fillPoly(np.zeros((240 * fine, 320 * fine), np.uint8), [corners * fine], 255)
-    alpha = cv2.resize(drawn, (320, 240), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
+    small = cv2.resize(drawn, (320, 240), interpolation=cv2.INTER_AREA)
+    alpha = np.asarray(small, np.float32) / np.float32(255)
     body = ReliefBody.of(ReliefSilhouette.of(alpha > 0.5), shapes.camera(), LiftSettings())
     matte = Matte(0, 0, alpha, np.zeros((240, 320, 3), np.float32))
     surface, _ = spread(body, 3000, 2.0, np.random.default_rng(0), matte)
