@@ -130,11 +130,12 @@ shown of hair and collar is plain; the coffee's handle and spoon lie flat on the
 end of the spoon's bowl is smeared where it covers the cup, and what turns into view of the cup's
 side is blurred. The horse is a sheet, as it was drawn. What does not look right: the invented fur
 along the cat's cheek is a little darker than the fur beside it, and that at the upper left is
-coarse; the fig in the bowl becomes narrow, and slides at 35; the photographer's back has a grey
-band; the clock, which is blurred, has a double edge, and the cell, which is blurred too, a hard one
-where its side turns into view; the colour ball is black on black at the frame, and has nicks and
-specks there; the pagoda leans, becomes narrow at 35, and shows light spots at its left windows; of
-the moon a piece of ground is selected, which has a ragged edge.
+coarse; the fig in the bowl becomes narrow, and slides at 35, where a strand stands off the bowl's
+edge; the photographer's back has a grey band; the clock, which is blurred, has a double edge, and
+the cell, which is blurred too, a hard one where its side turns into view; the colour ball is black
+on black at the frame, and has nicks and specks there; the pagoda leans, becomes narrow at 35, and
+shows light spots at its left windows; of the moon a piece of ground is selected, which has a ragged
+edge.
 """
 STEREO = """## A photographed thing whose shape is known
 
