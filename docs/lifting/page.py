@@ -101,11 +101,11 @@ the mug at 35 degrees it is the handle, which in truth comes before the body.
 
 What gained nothing and went out again: to heed more of the waves that the network sees behind (the
 ball loses 1.8 dB), to even the depth along the rim, to let the middle go on as a plane beyond the
-outline, four times as many Gaussians (the plate's
-wobble falls from 1.55 to 1.42 only), and to even corners as the rest of an outline (the box loses
-0.3 dB). Another seed alone moves the ring by 0.1 to 0.3 dB. Newly shown sides are [invented
-pictures](../concepts/photo-texture.md), which are never the true ones: on the ball they cost 0.3 dB
-against a plain colour, and take the flat share from 0.17 to 0.05.
+outline, four times as many Gaussians (the plate's wobble falls from 1.55 to 1.42 only), and to even
+corners as the rest of an outline (the box loses 0.3 dB). Another seed alone moves the ring by 0.1
+to 0.3 dB. Newly shown sides are [invented pictures](../concepts/photo-texture.md), which are never
+the true ones: on the ball they cost 0.3 dB against a plain colour, and take the flat share from
+0.17 to 0.05.
 
 ## What a turn is to be believed
 
