@@ -10,10 +10,13 @@ import numpy as np
 from ...base.arrays import F32, F64, Mask, frozen
 from ...base.kernel_files import numba
 from ...base.pixels import crop
+from ...base.poisson_disk import nearest_in
 from ...base.threads import LEAST_ROWS, in_threads
 from ...document.model import Matte
 
 LEAST_SIDE = 384  # px that the longer side keeps
+NEARBY = 2.0  # px, over which it is looked at how a field goes on
+LEAST_SPREAD = 0.3  # px^2, of the places that tell its slope
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,32 @@ def _in_blocks(image: F32, step: int) -> F32:
     height, width = image.shape[0] // step, image.shape[1] // step
     part = image[: height * step, : width * step]
     return np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA), np.float32)
+
+
+def carried_on(field: F64, known: Mask, reach: float) -> F64:
+    """`field` (h, w) where it is `known` (h, w), and beyond as it is about to go on there.
+
+    As the plane that is nearest to what is known nearby, as far as `reach` px; from there on it
+    stays as it is.
+    """
+    height, width = known.shape
+    y, x = np.mgrid[:height, :width] - 0.5 * np.array([[[height]], [[width]]])
+    weight, values = known.astype(np.float64), np.where(known, field, 0.0)
+
+    total = np.maximum(cv2.GaussianBlur(weight, (0, 0), NEARBY), 1e-12)
+
+    def mean(part: F64) -> F64:
+        return np.asarray(cv2.GaussianBlur(part, (0, 0), NEARBY), np.float64) / total
+
+    across, down, middle = mean(weight * x), mean(weight * y), mean(values)
+    xx, yy = (mean(weight * p * p) - q * q + LEAST_SPREAD for p, q in ((x, across), (y, down)))
+    xy = mean(weight * x * y) - across * down
+    right, below = mean(values * x) - across * middle, mean(values * y) - down * middle
+    slopes = np.stack([right * yy - below * xy, below * xx - right * xy]) / (xx * yy - xy * xy)
+    plane = middle + slopes[0] * (x - across) + slopes[1] * (y - down)
+    away = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5)
+    whole = np.where(known, field, plane)
+    return whole.ravel()[nearest_in(away <= reach)]
 
 
 def bilinear(field: np.ndarray, xy: F64) -> F64:

@@ -89,7 +89,7 @@ class ReliefLifter:
         progress(0.3, "Placing Gaussians")
         rng = np.random.default_rng(seed)
         band = max(band_width(camera.width, camera.height), _softness(mask, matte, outline.extent))
-        surface, spacing = spread(body, settings.count, band, rng)
+        surface, spacing = spread(body, settings.count, band, rng, matte)
         if hidden is not None and hidden.any():
             surface = _unseen(surface, hidden, SEAM * spacing)
         progress(0.7, "Colouring its back")

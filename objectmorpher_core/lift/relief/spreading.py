@@ -12,10 +12,12 @@ from dataclasses import dataclass, fields, replace
 import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import KDTree
 
 from ...base.arrays import F64, Mask
 from ...base.poisson_disk import thin_to_spacing
 from ...base.threads import in_threads
+from ...document.model import Matte
 from .body import BACK, FRONT, MIDDLE, ReliefBody
 from .canvas import bilinear
 from .silhouette import ReliefSilhouette
@@ -23,6 +25,9 @@ from .silhouette import ReliefSilhouette
 # The outlines of a silhouette as lines, along which a surface has its rim.
 
 SHORTEST = 4  # cells of a rim that is looked at
+BESIDE = np.linspace(-1.5, 1.5, 13)  # cells from an outline, at which the matte is looked up
+SHARP = 0.8, 0.2  # alpha at both ends of that, from which and up to which an edge is sharp
+EVEN = 2.0  # cells, over which an outline's direction is evened
 STAIRS, CORNERS = 4.0, 1.0  # cells, over which an outline's staircase is evened, and at corners
 STAIR = 0.35  # cells: what evening moves by more is no stair
 
@@ -71,8 +76,31 @@ def rim_lines(inside: Mask) -> list[RimLine]:
     return lines
 
 
+def _at_half(line: RimLine, outline: ReliefSilhouette, matte: Matte) -> RimLine:
+    """`line` where the matte is half covered: of a sharp edge it knows that to a tenth of a px."""
+    xy, cell = outline.photo_xy(line.xy), outline.cell
+    at = xy[:, None] - cell * BESIDE[:, None] * line.inward[:, None]  # from within outwards
+    at = at.reshape(-1, 2) - [matte.left + 0.5, matte.top + 0.5]
+    alpha = bilinear(matte.alpha, at).reshape(len(xy), -1)
+    falls = (alpha[:, :-1] >= 0.5) & (alpha[:, 1:] < 0.5)
+    is_sharp = (alpha[:, 0] > SHARP[0]) & (alpha[:, -1] < SHARP[1]) & (falls.sum(1) == 1)
+    k, rows = np.argmax(falls, axis=1), np.arange(len(xy))
+    before, after = alpha[rows, k], alpha[rows, k + 1]
+    share = (before - 0.5) / np.maximum(before - after, 1e-6)
+    beside = np.where(is_sharp, BESIDE[k] + share * (BESIDE[1] - BESIDE[0]), 0.0)
+    beside = gaussian_filter1d(beside, CORNERS, mode="wrap")
+    moved = line.xy - beside[:, None] * line.inward
+    smooth = gaussian_filter1d(moved, EVEN, axis=0, mode="wrap")
+    way = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
+    across = np.column_stack([-way[:, 1], way[:, 0]])
+    across *= np.sign((across * line.inward).sum(1, keepdims=True))
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    return RimLine(moved, np.where(length > 1e-6, across / np.maximum(length, 1e-6), line.inward))
+
+
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
+WITHDRAWN = 0.3  # x mean spacing: so far inside an outline a sheet's points are, but for its chain
 INSET = 0.6  # x mean spacing: so far beyond its outermost points a surface is drawn
 IN_LINE = 0.85  # x mean spacing: how far points along an outline are apart
 COVERED = 0.6  # x mean spacing: so far beyond a part's end it is drawn over what is behind
@@ -98,22 +126,31 @@ class SurfacePoints:
 
 
 def spread(
-    body: ReliefBody, count: int, band: float, rng: np.random.Generator
+    body: ReliefBody,
+    count: int,
+    band: float,
+    rng: np.random.Generator,
+    matte: Matte | None = None,
 ) -> tuple[SurfacePoints, float]:
     """About `count` points and their mean spacing in px.
 
-    `band`: how far outside the silhouette the matte covers something, px. Candidates are drawn in
-    proportion to the true area, then thinned to one spacing in 3D.
+    `band`: how far outside the silhouette the matte covers something, px. The `matte` tells where
+    exactly the outline is. Candidates are drawn in proportion to the true area, then thinned to one
+    spacing in 3D.
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
-    lines, ends = rim_lines(body.silhouette.inside), []
+    outline = body.silhouette
+    lines, ends = rim_lines(outline.inside), []
+    if matte is not None:
+        lines = [_at_half(line, outline, matte) for line in lines]
     if body.behind is not None:
         ends = rim_lines(body.behind.stands)
     total = sum(area.sum() for area in areas) + _wall_area(body, lines) + _inner_area(body)
     spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
     density = OVERSAMPLING / spacing**2  # candidates per px^2
     chains = [_chain(body, lines + ends, FRONT, spacing), _chain(body, lines, BACK, spacing)]
-    drawn = [_draw(body.silhouette, area * density, rng) for area in areas]
+    drawn = [_draw(outline, area * density, rng) for area in areas]
+    drawn = [xy[_is_within(xy, lines, outline, WITHDRAWN * spacing)] for xy in drawn]
     drawn = [np.vstack([chain, xy]) for chain, xy in zip(chains, drawn, strict=True)]
     around = [(_brim(body, band + BRIM * spacing, density, rng), 0)]
     around += _inner(body, spacing, density, rng)
@@ -178,6 +215,21 @@ def _draw(outline: ReliefSilhouette, expected: F64, rng: np.random.Generator) ->
     return outline.photo_xy(cells + rng.random((len(cells), 2)) - 0.5)
 
 
+def _is_within(xy: F64, lines: list[RimLine], outline: ReliefSilhouette, depth: float) -> Mask:
+    """Which photo px (N, 2) are `depth` px inside the lines, or half of what there is of a hair."""
+    found = np.ones(len(xy), bool)
+    if not lines:
+        return found
+    away, radius = bilinear(np.stack([outline.depth, outline.radius], -1), outline.grid_xy(xy)).T
+    near = np.flatnonzero(away < depth + 2 * outline.cell)
+    rim = outline.photo_xy(np.concatenate([line.xy for line in lines]))
+    _, nearest = KDTree(rim).query(xy[near])
+    inward = np.concatenate([line.inward for line in lines])[nearest]
+    inside = ((xy[near] - rim[nearest]) * inward).sum(1)
+    found[near] = inside >= np.minimum(depth, 0.5 * radius[near])
+    return found
+
+
 def _sheet(body: ReliefBody, xy: F64, side: float) -> SurfacePoints:
     """The front, or the back, at photo px (N, 2)."""
     height, gradient = body.sample(xy, side)
@@ -239,21 +291,26 @@ def _wall(body: ReliefBody, lines: list[RimLine], spacing: float) -> SurfacePoin
     One at least: where the sheets meet it is what one sees of the rim when it turns.
     """
     step = IN_LINE * spacing
-    places = [(np.zeros((0, 2)), np.zeros(0))]
+    places = [(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 2)))]
     for line in lines:
-        at = _along(line.length, step / body.silhouette.cell, line.xy)
+        both = np.hstack([line.xy, -line.inward])
+        at, outward = np.split(_along(line.length, step / body.silhouette.cell, both), 2, axis=1)
         xy = body.silhouette.photo_xy(at)
         front, back = (body.sample(xy, side)[0] for side in (FRONT, BACK))
         rows = np.maximum(np.floor((front - back) / step), 1)
         for row in range(int(rows.max(initial=0))):
             there = row < rows
             share = (row + 0.5) / rows[there]
-            places.append((xy[there], back[there] + share * (front - back)[there]))
-    xy, height = (np.concatenate(part) for part in zip(*places, strict=True))
+            height = back[there] + share * (front - back)[there]
+            places.append((xy[there], height, outward[there]))
+    xy, height, outward = (np.concatenate(part) for part in zip(*places, strict=True))
     points, order = np.column_stack([xy, height]), np.arange(len(xy))
     kept = thin_to_spacing(points, spacing * np.sqrt(PACKING), order)
-    xy, height = xy[kept], height[kept]
-    normals = np.column_stack([body.silhouette.outward(xy), np.zeros(len(xy))])
+    xy, height, outward = xy[kept], height[kept], outward[kept]
+    length = np.linalg.norm(outward, axis=1, keepdims=True)  # 0 at the tip of a hair
+    sure = outward / np.maximum(length, 1e-9)
+    outward = np.where(length > 1e-6, sure, body.silhouette.outward(xy))
+    normals = np.column_stack([outward, np.zeros(len(xy))])
     no = np.zeros(len(xy), bool)
     return SurfacePoints(xy, height, normals, no, no, no, xy)
 

@@ -7,17 +7,19 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F64
+from ...base.arrays import F64, Mask
 from ...base.camera import Camera
 from ...base.poisson_disk import nearest_in
+from ..relief.canvas import carried_on
 from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
 from .boxes import fit_box, fit_flat
-from .drawing import Mesh, RayGrid, drawn
+from .drawing import Drawn, Mesh, RayGrid, drawn
 from .evidence import Evidence, Misfit
 from .round import fit_ellipsoid, fit_revolution, fit_ring
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
+BEYOND = 2.0  # cells from a shape's own outline, up to which its sides go on
 REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside it
 # Of a shape's description: outline, depth and normals, each 1 where it is as far off as expected;
 # what of the mask it leaves out; and that a surface of revolution may have any profile. The outline
@@ -70,11 +72,25 @@ class Recognised:
         if not met.any():
             ones = np.ones(outline.shape)
             return PlacedShape(ones, ones, 0 * ones, 0.0)
-        nearest = nearest_in(met)
-        near, far = (1 / field.ravel()[nearest] for field in (seen.near, seen.far))
+        near, far = (1 / field for field in _carried_on(seen, met))
         gap = cv2.distanceTransform((~met).astype(np.uint8), cv2.DIST_L2, 3) * outline.cell
         share = np.clip(2 - gap / (REACH * outline.extent), 0, 1)
         return PlacedShape(near, far, share, weight)
+
+
+def _carried_on(seen: Drawn, met: Mask) -> tuple[F64, F64]:
+    """Inverse depths (h, w) of both sides of a shape, also beside where rays have `met` (h, w) it.
+
+    Each goes on as it is about to; beyond their common edge as the one that changes less.
+    """
+    nearest = nearest_in(met)
+    first, last = (field.ravel()[nearest] for field in (seen.near, seen.far))
+    near, far = (carried_on(field, met, BEYOND) for field in (seen.near, seen.far))
+    changes = np.abs(near - first), np.abs(far - last)
+    edge = (near * changes[1] + far * changes[0]) / np.maximum(sum(changes), 1e-12)
+    is_crossed = (near < far) & ~met
+    near, far = (np.where(is_crossed, edge, field) for field in (near, far))
+    return near.clip(last.min(), first.max()), far.clip(last.min(), first.max())
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.model import Matte
-from objectmorpher_core.lift.relief.canvas import LEAST_SIDE, ReliefCanvas
+from objectmorpher_core.lift.relief.canvas import LEAST_SIDE, ReliefCanvas, carried_on
 
 F32 = 1e-5
 HEIGHT, WIDTH = 3 * LEAST_SIDE + 1, 5 * LEAST_SIDE // 2
@@ -44,3 +44,15 @@ def test_it_holds_what_is_hidden_beside_the_matte():
     assert canvas.alpha[int(y), int(x)] == 0 and canvas.whole[int(y), int(x)] == 1
     x, y = (np.array([100, 100]) - canvas.corner) / canvas.step
     assert canvas.whole[int(y), int(x)] == canvas.alpha[int(y), int(x)] > 0
+
+
+def test_a_slope_goes_on_beyond_a_slanted_end_without_its_steps():
+    y, x = np.mgrid[:40, :60].astype(np.float64)
+    beyond = x + 0.1 * y - 30  # cells, of an end with a step every ten rows
+    slope, known = 3 + 2.0 * beyond, beyond < 0
+    whole = carried_on(slope, known, 3.0)
+    assert np.array_equal(whole[known], slope[known])
+    beside = (beyond > 0) & (beyond < 2) & (np.abs(y - 20) < 10)
+    line = np.polynomial.Polynomial.fit(beyond[beside], whole[beside], 1)
+    assert 1 < line.convert().coef[1] < 2  # a little held back
+    assert (whole[beside] - line(beyond[beside])).std() < 0.1
