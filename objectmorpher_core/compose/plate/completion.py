@@ -39,7 +39,7 @@ SLANTS = slice(-len(SLANT_SIGMAS), None)  # of the channels: they change sign in
 # A patch that matches nothing well costs least where it is smooth: by the variance of the texture.
 # Roughness must cost as much, and is less than a third of a texture's deviation in levels.
 ROUGHNESS_WEIGHT = 8.0  # x a colour channel's
-TONE_WEIGHT = 2.0  # x a colour channel's, of each of a tone's
+TONE_WEIGHT = 0.4  # x a colour channel's, of each of a tone's
 HOLE_WEIGHT = 0.4  # x a known pixel's, of one that is only guessed, when patches are compared
 TRUST = 1.3  # x less a patch's vote counts for each px that it lies deeper in the hole
 LEAST_TRUST = np.float32(1e-30)  # deep in a hole; less would be no whole float32 any more
