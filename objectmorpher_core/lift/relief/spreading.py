@@ -95,7 +95,8 @@ def _at_half(line: RimLine, outline: ReliefSilhouette, matte: Matte) -> RimLine:
     across = np.column_stack([-way[:, 1], way[:, 0]])
     across *= np.sign((across * line.inward).sum(1, keepdims=True))
     length = np.linalg.norm(across, axis=1, keepdims=True)
-    return RimLine(moved, np.where(length > 1e-6, across / np.maximum(length, 1e-6), line.inward))
+    is_even = (length > 1e-6) & is_sharp[:, None]  # a soft edge stays as it was
+    return RimLine(moved, np.where(is_even, across / np.maximum(length, 1e-6), line.inward))
 
 
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
