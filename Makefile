@@ -18,8 +18,8 @@ COMPILE := $(PYTHON) -m compileall -q app objectmorpher_core research tests
 PHOTO ?=
 ARGS ?=
 LOCK ?= # versions and hashes of what the tests need: packaging/locks/ci.txt
-# What pytest makes of the tests' sources is kept, too: a third of the time that it takes to begin.
-# Several test files at a time, one of them by one process; JOBS=0 is for debuggers.
+# Several test files run at a time, each in one process; JOBS=0 is for debuggers. Python keeps what it
+# compiles of the tests, which is a third of the time that a run takes to begin.
 JOBS ?= auto
 PYTEST = PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest -n $(JOBS) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 

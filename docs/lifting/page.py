@@ -126,7 +126,7 @@ object hides of another counts as invented although it may stay hidden.
 LOOKED = """\
 Each picture was looked at. Up to 25 degrees the flower, the rocket, the bowl, the coins and the
 logo look right, the astronaut and the coffee nearly so: her head is a little deep, and what is not
-shown of hair and collar is plain; the coffee's handle and spoon lie flat on the saucer, the upper
+shown of her neck is uneven; the coffee's handle and spoon lie flat on the saucer, the upper
 end of the spoon's bowl is smeared where it covers the cup, and what turns into view of the cup's
 side is blurred. The horse is a sheet, as it was drawn. What does not look right: the invented fur
 along the cat's cheek is a little darker than the fur beside it, and that at the upper left is

@@ -142,7 +142,7 @@ def spread(
     areas = [_area(body, side) for side in (FRONT, BACK)]
     outline = body.silhouette
     lines, ends = rim_lines(outline.inside), []
-    if matte is not None and body.behind is None:  # the end of a hidden part got teeth from it
+    if matte is not None and body.behind is None:  # or the end of a hidden part is ragged
         lines = [_at_half(line, outline, matte) for line in lines]
     if body.behind is not None:
         ends = rim_lines(body.behind.stands)
