@@ -133,8 +133,9 @@ def test_tiles_and_reference_draw_it_alike(pasted: Editor) -> None:
     texture = pasted.derived.shape(document.photo, item).texture
     one = tiles.render(splats, texture, camera, camera)
     other = reference.render(splats, texture, camera, camera)
-    apart = np.abs(one.color - other.color)
-    assert apart.max() <= 2 / 255 and apart.mean() <= 1e-4  # as in tests/core/raster/test_tiles.py
+    apart = np.abs(one.color - other.color).max(-1)
+    # One sample may lie beyond a layer's limit by rounding: see PIXEL in test_tiles.py.
+    assert (apart > 2e-3).sum() <= 1 and apart.max() <= 2 / 255 and apart.mean() <= 1e-6
     assert (one.from_photo > 0.9).sum() > 100, "it shows its photo"
 
 
