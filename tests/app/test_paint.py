@@ -8,7 +8,7 @@ import pytest
 from objectmorpher.canvas import painter
 from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.layer import PAINTED, FrameObject
-from objectmorpher.canvas.painter import shown_now
+from objectmorpher.canvas.painter import depth_range, moved_normals, shown_now
 from objectmorpher.canvas.shares import count_changed
 from objectmorpher.canvas.shares import shares as shares_of
 from objectmorpher.editor.editor import Editor
@@ -124,8 +124,11 @@ def test_depths_keep_their_colours_until_they_are_measured_again(
     painter, rest = cache.painter, cache.painter.measure(ball)
     painted(cache, turned, Shown.DEPTH)
     assert painter.spread(turned) is rest
-    again, depths = painter.measure(turned), cache.derived.posed(turned, 0).means[:, 2]
-    assert again != rest and again.near < depths.min() < again.far
+    again, splats = painter.measure(turned), cache.derived.posed(turned, 0)
+    is_facing = (moved_normals(splats.rest.normals, splats.linear) * splats.means).sum(1) < 0
+    assert again is not rest
+    expected = depth_range(splats.means[is_facing, 2], rest.diameter)
+    assert (again.near, again.far) == (expected.near, expected.far)
     assert painter.measure(ball) is rest
 
 

@@ -124,7 +124,7 @@ def _pulled(scene: shapes.Scene) -> Pose:
     """Two arms of the star pulled far apart."""
     points = scene.lifted.control_points
     left, right = int(points[:, 0].argmin()), int(points[:, 0].argmax())
-    far = 0.9 * scene.lifted.diameter
+    far = 0.6 * scene.lifted.diameter
     handles = (
         shapes.handle(scene.lifted, left, np.array([-far, 0, 0])),
         shapes.handle(scene.lifted, right, np.array([far, 0, 0])),
@@ -136,9 +136,9 @@ def test_stretched_gaussians_split_and_show_the_same_object(scene):
     pose, place = _pulled(scene), Placement(scale=0.6)
     splitting = Puppet(scene.lifted, DeformSettings(is_splitting=True), scene.camera)
     whole, pieces = scene.puppet.posed(pose, place), splitting.posed(pose, place)
-    assert len(pieces) > 1.02 * len(whole)
+    assert len(pieces) > 1.1 * len(whole)
     stretches = [np.linalg.svd(s.linear, compute_uv=False)[:, 0] for s in (whole, pieces)]
-    assert stretches[0].max() > 1.1
+    assert stretches[0].max() > 2
     pictures = [p.draw(pose, place, scene.texture, scene.camera) for p in (scene.puppet, splitting)]
     inside = cv2.erode((pictures[0].alpha > 0.99).astype(np.uint8), np.ones((5, 5))) > 0
     assert pictures[1].alpha[inside].min() > 0.98, "no gap"

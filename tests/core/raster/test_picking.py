@@ -63,12 +63,16 @@ def test_beside_the_object_its_nearest_pixel_within_reach_is_picked(scene, drawa
 
 def test_the_gaussians_named_are_those_that_are_seen_there(scene, drawable):
     alpha = tiles.draw(drawable, scene.texture).alpha
-    splats = drawable.splats
-    for xy in _pixels(alpha > 0.9, 20):
+    splats, away = drawable.splats, []
+    for xy in _pixels(alpha > 0.9, 400):
         hit = pick(drawable, scene.texture, xy)
         assert hit is not None and len(hit.gaussians)
         seen = drawable.camera.unproject(hit.xy, hit.depth)
-        assert np.linalg.norm(splats.means[hit.gaussians[0]] - seen) < 2.5 * splats.rest.spacing
+        away.append(np.linalg.norm(splats.means[hit.gaussians[0]] - seen) / splats.rest.spacing)
+    # Where a surface is seen edge-on, one pixel lies several spacings along it.
+    assert np.median(away) < 0.6
+    assert np.quantile(away, 0.99) < 2.5
+    assert np.max(away) < 4
 
 
 def test_behind_a_faint_layer_the_greater_part_is_picked():
