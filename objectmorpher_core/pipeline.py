@@ -38,6 +38,7 @@ from .document.model import (
 )
 from .document.settings import Hint
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
+from .lift.relief.depth_look import look_at_all
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
 from .raster.posed import PosedSplats
 from .scripting import runner
@@ -263,6 +264,8 @@ def continue_script(
             step = part(progress, 0.6, 0.85)
             behind = with_plate(document, script, frozenset(run.casting), step)
             document, notes = behind.document, (*notes, *behind.notes)
+    if not script.no_depth and any(item.shadow.strength > 0 for item in document.objects):
+        document = edits.set_depth(document, look_at_all(document.photo.pixels))
     for k, wanted in enumerate(wishes):
         if wanted.script.refine == "harmonise":
             document = edits.harmonised(document, k).with_backend("refine", "harmonise")

@@ -148,12 +148,18 @@ def _stack(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
         own[k] = puppets.get(k) or puppet_of(objects[k], camera)
         return own[k].posed(objects[k].pose, objects[k].placement)
 
-    lighting, things = Lighting(document), []
-    for k, splats in stack(document, posed).items():
+    lighting, things, horizon = Lighting(document), [], document.horizon
+    there = stack(document, posed)
+    casters = [
+        (k, caster)
+        for k, splats in there.items()
+        if splats is not None and (caster := lighting.caster(objects[k], splats, horizon))
+    ]
+    for k, splats in there.items():
         item, look = objects[k], NOTHING
-        if item.is_moved and splats is not None:
+        if splats is not None and (item.is_moved or casters):
             rest = partial(own[k].posed, None, Placement())
-            look = lighting.of(item, splats, rest, document.horizon)
+            look = lighting.of(item, splats, rest, horizon, casters=casters, number=k)
         has_hole = leaves_a_hole(objects, k)
         things.append(Moved(item, splats, has_hole, look))
     return tuple(things)
@@ -181,7 +187,7 @@ class _Drawing:
     def _region(self, camera: Camera) -> Box:
         """Everything the edit can touch."""
         margin = int(np.ceil(self._margin)) + 2
-        boxes = [thing.matte.box for thing in self._things if thing.item.is_moved]
+        boxes = [t.matte.box for t in self._things if t.item.is_moved or t.look.is_shaded]
         for k, shown in self._drawables.items():
             if (box := shown.box()) is not None:
                 rim = reach_of(self._things[k].look.blur)
@@ -219,7 +225,7 @@ class _Drawing:
             if picture is not None:
                 rows = map_in_threads(partial(_with, thing, picture, above), rows)
             elif not thing.item.is_moved:
-                rows = map_in_threads(partial(_at_rest, thing.matte), rows)
+                rows = map_in_threads(partial(_at_rest, thing), rows)
             elif thing.has_hole:
                 rows = map_in_threads(partial(_without, thing.matte), rows)
         return map_in_threads(with_touched, rows)
@@ -322,18 +328,25 @@ def _without(matte: Matte, rows: Rows) -> Rows:
     return replace(rows, moved=moved, is_covered=rows.is_covered | was_there)
 
 
-def _at_rest(matte: Matte, rows: Rows) -> Rows:
+def _at_rest(thing: Moved, rows: Rows) -> Rows:
     """`rows` with an object over them that is where it was: what it hides may move as it likes."""
+    matte = thing.matte
     alpha = np.minimum(crop(matte.alpha, matte.box, rows.box), 1.0)
     own, through = alpha[..., None], 1 - alpha
+    colour = own * crop(matte.foreground, matte.box, rows.box)
+    touched = None if rows.touched is None else rows.touched * through
+    if (relit := thing.look.relit) is not None:
+        shaded = relit.lit(colour, alpha, rows.left, rows.top)
+        taken = np.abs(shaded - colour).max(-1)
+        colour, touched = shaded, taken if touched is None else np.maximum(touched, taken)
     return replace(
         rows,
-        colour=own * crop(matte.foreground, matte.box, rows.box) + (1 - own) * rows.colour,
+        colour=colour + (1 - own) * rows.colour,
         from_photo=alpha + through * rows.from_photo,
         from_lifter=through * rows.from_lifter,
         from_inpainter=through * rows.from_inpainter,
         moved=np.where(alpha >= OPAQUE, np.float32(0), rows.moved),
-        touched=None if rows.touched is None else rows.touched * through,
+        touched=touched,
     )
 
 
@@ -353,7 +366,8 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
     picture = _part(around, inner.start, inner.stop)
     through = 1 - picture.alpha
     touched = None if rows.touched is None else rows.touched * through
-    if thing.item.finish != AS_IN_THE_PHOTO:  # also where it has not moved
+    # Also where it has not moved.
+    if thing.item.finish != AS_IN_THE_PHOTO or thing.look.is_shaded:
         own = np.maximum(picture.alpha, rest[inner])
         touched = own if touched is None else np.maximum(touched, own)
     return replace(

@@ -19,6 +19,7 @@ from ..document.model import Document, EditObject, Matte, Plate
 from ..document.settings import Refined
 from .blend import Box
 from .composite import Composite, Moved, composite, drawn_alone, whole_box
+from .light.relight import Relit
 from .order import holes
 from .plate.plate import overlap, plate_of_holes
 from .shadow.shadow import Shade
@@ -101,13 +102,16 @@ def _distinct(document: Document) -> list[EditObject]:
 def _drawn(thing: Moved, document: Document) -> tuple[np.ndarray, Box]:
     dtype = document.photo.pixels.dtype
     if not thing.item.is_moved:
-        return _resting(thing.matte, dtype)
+        return _resting(thing.matte, dtype, thing.look.relit)
     return drawn_alone((thing,), document.photo.camera, dtype)
 
 
-def _resting(matte: Matte, dtype: np.dtype) -> tuple[np.ndarray, Box]:
-    """(h, w, 4) what the photo shows of an object."""
-    soft = np.dstack([matte.foreground, np.minimum(matte.alpha, 1.0)])
+def _resting(matte: Matte, dtype: np.dtype, shaded: Relit | None = None) -> tuple[np.ndarray, Box]:
+    """(h, w, 4) what the photo shows of an object, `shaded` by others."""
+    colour = matte.foreground
+    if shaded is not None:
+        colour = shaded.lit(colour, np.ones_like(matte.alpha), matte.left, matte.top)
+    soft = np.dstack([colour, np.minimum(matte.alpha, 1.0)])
     return pixels_from_unit(np.where(soft[..., 3:] > 0, soft, 0), dtype), matte.box
 
 

@@ -17,6 +17,7 @@ from .plate.plate import hole_margin
 MOSTLY = 0.5  # of a moved object: what hides more of it is hardly what was meant to
 FRAMED = 3  # sides of the photo: what touches so many is its background
 ALONG = 0.1  # of a side's length, from which it is touched
+SHADOW = 0.5  # x an object's size, how far the edge of its shadow reaches
 EDGE = 4.0  # x the spacing of the Gaussians, how far an object reaches around their means
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 px of the photo
 Posed = Callable[[int], PosedSplats]
@@ -162,6 +163,8 @@ def _reach(document: Document, k: int, splats: PosedSplats) -> Bounds:
     elif item.is_visible:
         x0, y0, x1, y1 = -np.inf, -np.inf, np.inf, np.inf
     margin = hole_margin(camera.width, camera.height)
+    if item.is_visible and item.shadow.strength > 0:  # which may fall on what it comes near
+        margin += (item.shadow.length + SHADOW) * max(x1 - x0, y1 - y0)
     return x0 - margin, y0 - margin, x1 + margin, y1 + margin
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import Mask, Selection, frozen
+from ..base.arrays import F32, Mask, Selection, frozen
 from ..base.camera import Camera
 from .edge_edits import decontaminated
 from .model import (
@@ -394,6 +394,14 @@ def set_horizon(document: Document, horizon: float) -> Document:
     return replace(document, horizon=float(horizon), refined=None)
 
 
+def set_depth(document: Document, depth: F32 | None) -> Document:
+    """How near what the photo shows is, see `Document.depth`: shadows fall on it."""
+    if depth is not None and (depth.ndim != 2 or not depth.size or not np.isfinite(depth).all()):
+        raise EditError("a depth map is a number for each of its pixels")
+    kept = None if depth is None else frozen(depth, np.float32)
+    return replace(document, depth=kept, refined=None)
+
+
 def rename(document: Document, k: int, name: str) -> Document:
     """Object `k` under another name."""
     name = name.strip()
@@ -530,7 +538,7 @@ def show_the_same(one: Document, other: Document) -> bool:
         return False
     if (one.horizon, one.feather) != (other.horizon, other.feather):
         return False
-    if len(one.objects) != len(other.objects):
+    if one.depth is not other.depth or len(one.objects) != len(other.objects):
         return False
     return all(map(is_shown_alike, one.objects, other.objects))
 

@@ -551,6 +551,8 @@ class Document:
     horizon: float | None = None  # px, row of the photo in which it is; None: the middle one
     feather: float = 1.0  # x the usual width over which the edit is blended into the photo
     hints: tuple[Hint, ...] = ()  # from where the plate is filled
+    # (h, w) inverse depth, up to a factor and a shift, stretched over the photo; None: not known
+    depth: F32 | None = None
     refined: Refined | None = None  # None: not asked for, or what it showed has changed since
 
     def with_object(self, k: int, changed: EditObject) -> Document:

@@ -310,6 +310,8 @@ def _check(document: Document) -> None:
         _check_lifted(item)
     if document.horizon is not None and abs(document.horizon) > MAX_HORIZON * height:
         raise ValueError(f"a horizon at {document.horizon:g} px is far outside the photo")
+    if (depth := document.depth) is not None and (depth.ndim != 2 or not depth.size):
+        raise ValueError(f"a depth map is {depth.shape}, not a number for each pixel")
     if (plate := document.plate) is not None:
         _same("plate", plate.pixels.shape, (*plate.hole.shape, 3))
         _inside("plate", plate.box, (width, height))

@@ -122,7 +122,8 @@ def build_frame(
     if shown in OVER_PHOTO:  # the other views show what is below it
         refined = cache.refined.layers(document, view, shown is Shown.PROVENANCE)
     plate = cache.derived.plate(document) if moved else None
-    blend = _blend(document, [(there[k], lit[k]) for k in moved], plate, view, cache)
+    shaded = [look for k, look in lit.items() if look.is_shaded and k not in moved]
+    blend = _blend(document, [(there[k], lit[k]) for k in moved], shaded, plate, view, cache)
     return Frame(objects, plate, shades, refined, blend)
 
 
@@ -175,7 +176,8 @@ def _lit(
         return dict.fromkeys(there, NOTHING)
     cache.lights.forget(there)
     is_hurried = math.isfinite(cache.frame_time)
-    return {k: cache.lights.of(document, there[k], is_hurried) for k in sorted(there)}
+    casters = cache.lights.casters(document, there.values())
+    return {k: cache.lights.of(document, there[k], is_hurried, casters) for k in sorted(there)}
 
 
 def _front(document: Document, k: int, view: ViewState, cache: Cache) -> CanvasLayer | None:
@@ -205,12 +207,18 @@ def _drawn(
 
 
 def _blend(
-    document: Document, moved: list[tuple[PosedObject, Lit]], plate: Plate | None,
-    view: ViewState, cache: Cache,
+    document: Document, moved: list[tuple[PosedObject, Lit]], shaded: list[Lit],
+    plate: Plate | None, view: ViewState, cache: Cache,
 ) -> F32:  # fmt: skip
-    """Where the canvas shows the edit, remembered; `plate` is the one that it shows."""
-    looks = [look for _, look in moved]
-    key = (*view.place, *((id(look.shade), look.blur) for look in looks))
+    """Where the canvas shows the edit, remembered; `plate` is the one that it shows.
+
+    `shaded`: what rests, where shadows fall on it.
+    """
+    looks = [look for _, look in moved] + shaded
+    key = (
+        *view.place,
+        *((id(look.shade), id(look.relit) * look.is_shaded, look.blur) for look in looks),
+    )
     if cache.blended is None or cache.blended[0] is not document or cache.blended[1] != key:
         touched = cache.lights.touched(plate, looks, view, CELL)
         cache.blended = (document, key, build_blend(document, moved, view, touched))

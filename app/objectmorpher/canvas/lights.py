@@ -7,7 +7,7 @@ pointer rests, it is the one that is exported.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +24,11 @@ from .memo import Memo, same
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lighting, Lit
+    from objectmorpher_core.compose.shadow.fall import Caster
 
 STILL = 0.12  # s without a change, after which the shadow is the exact one
+SEEN = 1 / 255  # of a factor: less is not seen
+LOOKED = 500  # Gaussians of an object, by which one tells whether a shadow comes near it
 SMALL = 1024  # px, longer side of the picture of what was repaired
 
 
@@ -41,6 +44,7 @@ class _Kept:
     shade: CanvasLayer | None = None
 
 
+Casters = Sequence[tuple[PosedObject, "Caster"]]
 Ask = Callable[[int, Callable[[], "Lit"], Callable[["Lit"], None]], None]
 
 
@@ -50,6 +54,7 @@ class Lights:
     def __init__(self) -> None:
         self._kept: dict[int, _Kept] = {}
         self._lightings, self._painted, self._rests = Memo(), Memo(), Memo()
+        self._casters = Memo()
         self.ask: Ask | None = None  # computes an object's elsewhere and calls back
 
     @property
@@ -61,29 +66,53 @@ class Lights:
         """Drops what is kept of objects other than these."""
         self._kept = {k: kept for k, kept in self._kept.items() if k in moved}
 
-    def of(self, document: Document, own: PosedObject, is_hurried: bool) -> Lit:
+    def casters(self, document: Document, there: Iterable[PosedObject]) -> Casters:
+        """The objects that throw a shadow, each with a sketch of it."""
+        lighting, horizon = self._lighting(document), document.horizon
+        found = []
+        for own in there:
+            item = own.item
+            if item.is_moved and item.is_visible and item.shadow.strength > 0:
+                caster = self._casters(
+                    lambda own=own: lighting.caster(own.item, own.draft, horizon, is_sketch=True),
+                    own.draft, item.shadow, horizon, lighting,
+                )  # fmt: skip
+                if caster is not None:
+                    found.append((own, caster))
+        self._casters.make_room(len(found))
+        return found
+
+    def of(
+        self, document: Document, own: PosedObject, is_hurried: bool, casters: Casters = ()
+    ) -> Lit:
         """Light and shadow of an object as the window shows them now.
 
         `is_hurried`: a frame has only so much time, and what is new is a sketch for now.
+        `casters`: of the frame's objects, whose shadows may fall on it.
         """
         from objectmorpher_core.compose.light.lighting import NOTHING
 
         k, item = own.k, own.item
         shares = (item.harmony, item.relight, item.grain, item.defocus)
         has_any = item.shadow.strength or any(shares) or item.finish != AS_IN_THE_PHOTO
-        if not item.is_moved or not item.is_visible or not has_any:
+        own_points = own.draft.means[:: max(len(own.draft.means) // LOOKED, 1)]
+        near = [(o, c) for o, c in casters if o.k == k or c.reaches(own_points)]
+        others = [o for o, _ in near if o.k != k]
+        if not item.is_visible or not (others or (item.is_moved and has_any)):
             self._kept.pop(k, None)
             return NOTHING
-        sources = (own.posed, item.shadow, *shares, item.finish, document.plate, document.horizon)
+        around = document.plate, document.horizon, document.depth
+        sources = (own.posed, item.shadow, *shares, item.finish, *around)
+        sources += tuple(part for o in others for part in (o.posed, o.item.shadow))
         kept, now = self._kept.get(k), time.monotonic()
         if kept is None or not same(kept.sources, sources):
-            lit = self._work(document, own, is_hurried)()
+            lit = self._work(document, own, is_hurried, near)()
             self._kept[k] = _Kept(sources, lit, now, is_hurried)
         elif kept.is_sketch and not kept.is_asked and now - kept.since >= STILL:
-            self._make_exact(document, own, kept)
+            self._make_exact(document, own, kept, near)
         return self._kept[k].lit
 
-    def _make_exact(self, document: Document, own: PosedObject, kept: _Kept) -> None:
+    def _make_exact(self, document: Document, own: PosedObject, kept: _Kept, near: Casters) -> None:
         """Replaces what is kept of an object, now or when it is answered."""
         k, kept.is_asked = own.k, True
 
@@ -91,13 +120,15 @@ class Lights:
             if self._kept.get(k) is kept:
                 self._kept[k] = _Kept(kept.sources, lit, time.monotonic(), False)
 
-        work = self._work(document, own, is_sketch=False)
+        work = self._work(document, own, False, near)
         if self.ask is None:
             accept(work())
         else:
             self.ask(k, work, accept)
 
-    def _work(self, document: Document, own: PosedObject, is_sketch: bool) -> Callable[[], Lit]:
+    def _work(
+        self, document: Document, own: PosedObject, is_sketch: bool, near: Casters
+    ) -> Callable[[], Lit]:
         """What computes light and shadow of an object, in any thread."""
         item, puppet, texture = own.item, own.shape.puppet, own.shape.texture
         lighting = self._lighting(document)
@@ -105,12 +136,26 @@ class Lights:
         splats = own.draft if is_coarse else own.posed
         posed = puppet.draft if is_coarse else puppet.posed
         rest = self._rests(lambda: posed(None, Placement()), puppet, is_coarse)
-        return lambda: lighting.of(item, splats, lambda: rest, document.horizon, texture, is_sketch)
+        horizon = document.horizon
+
+        def work() -> Lit:
+            casters = [
+                (o.k, sketch if is_sketch else lighting.caster(o.item, o.posed, horizon))
+                for o, sketch in near
+            ]
+            told = [(k, caster) for k, caster in casters if caster is not None]
+            return lighting.of(item, splats, lambda: rest, horizon, texture, is_sketch, told, own.k)
+
+        return work
 
     def _lighting(self, document: Document) -> Lighting:
         from objectmorpher_core.compose.light.lighting import Lighting
 
-        return self._lightings(lambda: Lighting(document), document.photo, document.plate)
+        has_depth = document.depth is not None
+        lifted = (o.mask for o in document.objects if has_depth and o.lifted is not None)
+        return self._lightings(
+            lambda: Lighting(document), document.photo, document.plate, document.depth, *lifted
+        )
 
     # The picture
 
@@ -142,6 +187,9 @@ class Lights:
         shape = (-(-view.height // cell), -(-view.width // cell))
         touched = np.zeros(shape, np.float32)
         for look in looks:
+            if look.is_shaded and (relit := look.relit) is not None:
+                corner, there = (relit.left, relit.top), np.abs(relit.factor) > SEEN
+                _mark(touched, there, corner, relit.pitch, (view, cell))
             if (shade := look.shade) is not None:
                 corner = (shade.left, shade.top)
                 _mark(touched, shade.alpha > 0, corner, shade.pitch, (view, cell))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from objectmorpher_core import compose
 
 from ..editor.editor import Editor
-from ..editor.intents.composing import SHADOW, VARIANTS
+from ..editor.intents.composing import DEPTH, SHADOW, VARIANTS
 from ..editor.intents.refining import REFINE
 from ..editor.tasks import PLATE
 from ..editor.view import Composed, ToolName
@@ -105,6 +105,18 @@ def _not_refined(editor: Editor) -> str | None:
     return nothing_lifted(editor) or (None if is_refined else t("The edit is not refined"))
 
 
+def _falls_on_depth(editor: Editor) -> bool:
+    return editor.document is not None and editor.document.depth is not None
+
+
+def _cannot_look(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(DEPTH):
+        return t("The depth model is looking at the photo")
+    if not editor.models.has_depth and not _falls_on_depth(editor):
+        return t("This needs a depth model: Window > Models")
+    return nothing_lifted(editor)
+
+
 COMMANDS: dict[str, Command] = {
     "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
     "take_from": Command(
@@ -131,4 +143,8 @@ COMMANDS: dict[str, Command] = {
         "Remove refinement", "", lambda e: e.refining.remove(), _not_refined
     ),
     "shadow": Command("Shadow", "", lambda e: e.composing.toggle_shadow(), not_moved),
+    "depth": Command(
+        "Shadows fall on walls and steps", "", lambda e: e.composing.toggle_depth(),
+        _cannot_look, _falls_on_depth,
+    ),
 }  # fmt: skip

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.base.arrays import RGB, U8, Mask, Pixels, Selection
+from objectmorpher_core.base.arrays import F32, RGB, U8, Mask, Pixels, Selection
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import Progress, part
 from objectmorpher_core.document.model import (
@@ -336,6 +336,14 @@ def take_shadow(
         cutout.pixels, cutout.covered, [old], inpainter, step, choice.seed, choice.hints
     )
     return old.shadow, plate
+
+
+def look_at_depth(pixels: Pixels, progress: Progress) -> F32 | None:
+    """The photo's inverse depth, see `Document.depth`; None where no network is installed."""
+    from objectmorpher_core.lift.relief.depth_look import look_at_all
+
+    progress(0.0, "")
+    return look_at_all(pixels)
 
 
 def cut_edit(document: Document, progress: Progress) -> CoarseEdit:

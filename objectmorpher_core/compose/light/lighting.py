@@ -6,7 +6,7 @@ So they are the same for window and export.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,7 +22,8 @@ from ...document.settings import AS_IN_THE_PHOTO, Shadow
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, build_levels
 from ..plate.plate import plate_cover
-from ..shadow.shadow import COARSE, FINE, Shade, StandingObject, cast, ground_normal
+from ..shadow.fall import Caster
+from ..shadow.shadow import COARSE, FINE, Shade, StandingObject, ground_normal
 from ..silhouette import SKETCHED, sketch, sketched
 from .defocus import PhotoDefocus, StandingPlane, find_defocus
 from .grain import Grain, find_grain, sketch_grain
@@ -40,6 +41,7 @@ from .noise import Noise, find_noise
 from .relight import Relit, relight
 
 MARGIN = 16  # px around the cut-out that have its colours, not those of invented pictures
+BESIDE = 0.01  # x the longer side of a depth map: from how far around it is filled in
 CAST = 40_000  # Gaussians, of which a shadow is made
 
 
@@ -56,6 +58,7 @@ class Lit:
     saturation: float = 1.0  # x as far from grey; after all the others
     opacity: float = 1.0  # of the whole
     mode: str = NORMAL  # of MODES
+    is_shaded: bool = False  # by another object: `relit` says where
 
 
 NOTHING = Lit()
@@ -115,6 +118,23 @@ class Lighting:
         """Return the blur of the photo."""
         return PhotoDefocus(self._document.photo.pixels, plate_cover(self._document))
 
+    @cached_property
+    def _depth(self) -> F32 | None:
+        """The document's depth map, as if nothing stood where objects can be taken away."""
+        if (depth := self._document.depth) is None:
+            return None
+        taken = np.zeros(depth.shape, np.uint8)
+        for item in self._document.objects:
+            if item.lifted is not None and item.mask is not None:
+                own = item.mask.astype(np.float32)
+                there = cv2.resize(own, depth.shape[::-1], interpolation=cv2.INTER_AREA) > 0
+                taken[cv2.dilate(there.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 1
+        low, span = float(depth.min()), max(float(np.ptp(depth)), 1e-9)
+        unit = np.asarray((depth - low) / span, np.float32)
+        reach = BESIDE * max(depth.shape)
+        filled = cv2.inpaint(unit, taken, reach, cv2.INPAINT_NS)
+        return np.asarray(filled * span + low, np.float32)
+
     def of(
         self,
         item: EditObject,
@@ -123,14 +143,25 @@ class Lighting:
         horizon: float | None,
         texture: TextureLevels | None = None,
         is_sketch: bool = False,
+        casters: Sequence[tuple[int, Caster]] = (),
+        number: int = -1,
     ) -> Lit:
-        """Return the lighting of a moved object with Gaussians `splats` now and `rest` before.
+        """Return the lighting of an object with Gaussians `splats` now and `rest` before.
 
         `horizon`: the photo's, px, where it is known. `is_sketch`: the shadow is a coarse one, in
-        the time that a frame of a drag has.
+        the time that a frame of a drag has. `casters`: of the document, with the number of the
+        object that throws it; this one has that `number`. What has not moved only takes their
+        shadows.
         """
+        others = [caster for k, caster in casters if k != number]
+        if others:
+            few = splats.means[sketched(splats)]
+            others = [caster for caster in others if caster.reaches(few)]
+        if not item.is_moved:
+            fallen = relight(splats, ABOVE, 0.0, self._document.photo.camera, is_sketch, others)
+            return NOTHING if fallen is None else Lit(relit=fallen, is_shaded=True)
         has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
-        has_any = has_shadow or has_light or item.relight or item.grain or item.defocus
+        has_any = has_shadow or has_light or item.relight or item.grain or item.defocus or others
         if not item.is_visible or not (has_any or item.finish != AS_IN_THE_PHOTO):
             return NOTHING
         assert item.matte is not None, "a lifted object has a matte"
@@ -139,13 +170,12 @@ class Lighting:
         if item.defocus > 0:
             blur = item.defocus * self._defocus(item, splats, rest(), horizon)
         if has_shadow:
-            most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
-            standing = stand(splats, camera, horizon, item.shadow, most)
-            shade = None if standing is None else cast(item.shadow, standing, cells)
+            shade = next((caster.shade for k, caster in casters if k == number), None)
         if has_light:
             gain = at_strength(self._gain(item, splats, rest), item.harmony)
-        if item.relight > 0:
-            relit = relight(splats, self._light_of(item), item.relight, camera, is_sketch)
+        if item.relight > 0 or others:
+            light = self._light_of(item) if item.relight > 0 else ABOVE
+            relit = relight(splats, light, item.relight, camera, is_sketch, others)
         if item.grain > 0 and self.noise is not None:
             if is_sketch:
                 grain = sketch_grain(splats, self.noise, item.grain, camera, blur)
@@ -156,8 +186,21 @@ class Lighting:
         own = item.finish
         return Lit(
             (r, g, b), shade, relit, grain, math.hypot(blur, own.blur), own.sharpness,
-            own.saturation, own.opacity, own.blend_mode,
+            own.saturation, own.opacity, own.blend_mode, relit is not None and bool(others),
         )  # fmt: skip
+
+    def caster(
+        self, item: EditObject, splats: PosedSplats, horizon: float | None, is_sketch: bool = False
+    ) -> Caster | None:
+        """Return the shadow that a moved object throws; None where it throws none."""
+        if not item.is_moved or not item.is_visible or item.shadow.strength <= 0:
+            return None
+        camera = self._document.photo.camera
+        most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
+        standing = stand(splats, camera, horizon, item.shadow, most)
+        if standing is None:
+            return None
+        return Caster(item.shadow, standing, camera, horizon, cells, self._depth)
 
     def _gain(self, item: EditObject, splats: PosedSplats, rest: Callable[[], PosedSplats]) -> Gain:
         """The factors of an object's colours in the light of where it is now."""

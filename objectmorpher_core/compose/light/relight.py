@@ -7,6 +7,7 @@ know that. So each place is multiplied by what light it gets now over what it go
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,7 @@ from ...base.threads import EXACT, FAST, in_threads
 from ...raster import tiles
 from ...raster.posed import PosedSplats
 from ...raster.texture import build_levels
+from ..shadow.fall import Caster
 from ..silhouette import SilhouetteGrid, cell_places, fine_grid, sketch_grid, sketched
 
 LEAST, MOST = 0.6, 1.6  # factor of encoded values
@@ -112,11 +114,17 @@ def _find_gains(above, below, share, columns, across, line, gains):
 
 
 def relight(
-    splats: PosedSplats, light: F64, strength: float, camera: Camera, is_sketch: bool = False
+    splats: PosedSplats,
+    light: F64,
+    strength: float,
+    camera: Camera,
+    is_sketch: bool = False,
+    casters: Sequence[Caster] = (),
 ) -> Relit | None:
-    """The factors of a moved object, as the photo's `camera` sees it; None where there are none.
+    """The factors of an object, as the photo's `camera` sees it; None where there are none.
 
     `light` (3,): of `estimate_light`. `is_sketch`: coarser, in the time that a frame of a drag has.
+    `casters`: other objects, whose shadows fall on it.
     """
     few = sketched(splats) if is_sketch else None
     grid = fine_grid(splats, camera) if few is None else sketch_grid(splats, few, camera)
@@ -124,6 +132,10 @@ def relight(
         return None
     normals = turned_normals(splats)
     factors = _factors(splats, normals, strength * light)
+    asked = slice(None) if few is None else few
+    for caster in casters:
+        ink = float(np.mean(caster.shadow.colour))
+        factors[asked] *= 1 - (1 - ink) * caster.on(splats.means[asked], normals[asked])
     if np.abs(factors - 1).max() < NOTHING:
         return None
     if few is None:
@@ -165,11 +177,12 @@ def _factors(splats: PosedSplats, normals: F64, light: F64) -> F64:
 
 def _drawn(splats: PosedSplats, factors: F64, grid: SilhouetteGrid, camera: Camera) -> F32:
     """(h, w) the factors as a picture of the object, continued beyond it."""
-    share = (factors - LEAST) / (MOST - LEAST)
+    least = min(LEAST, float(factors.min()))
+    share = (factors - least) / (MOST - least)
     painted = splats.painted(np.repeat(share[:, None], 3, axis=1), has_edge=False)
     picture = tiles.draw(tiles.prepare(painted, grid.camera(camera), camera), NO_PHOTO)
     values = _continued(picture.color[..., 0], picture.alpha)
-    return (LEAST + (MOST - LEAST) * values).astype(np.float32)
+    return (least + (MOST - least) * values).astype(np.float32)
 
 
 def _sketched(means: F64, normals: F64, factors: F64, grid: SilhouetteGrid, camera: Camera) -> F32:

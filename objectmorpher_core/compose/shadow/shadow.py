@@ -82,17 +82,29 @@ def ground_normal(camera: Camera, horizon: float | None, shadow: Shadow, row: fl
     return np.array([0.0, np.cos(tilt), np.sin(tilt)])
 
 
-def cast(shadow: Shadow, standing: StandingObject, cells: int = FINE) -> Shade | None:
-    """The shadow of an object, of at most so many `cells`; None where there is none."""
+def cast(
+    shadow: Shadow, standing: StandingObject, cells: int = FINE, horizon: float | None = None
+) -> Shade | None:
+    """The shadow of an object, of at most so many `cells`; None where there is none.
+
+    Where the row of the photo is known that the `horizon` lies in, px, it ends there.
+    """
     if shadow.strength <= 0 or (grid := standing.grid(shadow, cells)) is None:
         return None
-    far, near = standing.far(shadow, grid), standing.contact(grid)
-    light = np.asarray((1 - far) * (1 - np.float32(shadow.contact) * near), np.float32)
-    return _shade(shadow, light, grid)
+    if horizon is not None and standing.is_above(horizon):  # it is in the air
+        return None
+    alpha = opacity(shadow, standing.far(shadow, grid), standing.contact(grid))
+    if horizon is not None:
+        rows = grid.top + grid.pitch * (np.arange(grid.height) + 0.5)
+        alpha[rows <= horizon + grid.pitch] = 0
+    return trimmed(alpha, grid, shadow.colour)
 
 
 class StandingObject:
-    """An object that stands on the ground, or hangs a little above it."""
+    """An object that stands on the ground, or hangs a little above it.
+
+    The ground is where a point times `normal` is `depth`.
+    """
 
     def __init__(self, points: F64, normal: F64, camera: Camera) -> None:
         """Of world points (N, 3) that are spread evenly over it.
@@ -104,20 +116,26 @@ class StandingObject:
             raise ValueError("an object without a single solid point throws no shadow")
         above = -(points @ normal)
         foot, top = np.percentile(above, (SPRAY, 100 - SPRAY))
-        self._height = max(float(top - foot), 1e-9)
+        self.points, self.normal, self.depth = points, normal, -float(foot)
+        self.height = max(float(top - foot), 1e-9)
         above = np.maximum(above - foot, 0.0)
         middle = np.median(points, 0)
         sine = float(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9))
         self._above = np.maximum(above - _level(points, above, float(np.clip(sine, 0, 1))), 0.0)
         self._feet = points + self._above[:, None] * normal
-        self._is_low = self._above <= BAND * self._height
+        self._is_low = self._above <= BAND * self.height
         self._right = np.array([1.0, 0.0, 0.0])
         self._nearer = np.cross(normal, self._right)  # on the ground, towards the viewer
         self._camera = camera
-        size = self._height * camera.focal / max(float(middle[2]), 1e-9)
+        size = self.height * camera.focal / max(float(middle[2]), 1e-9)
         self._size = min(size, float(FARTHEST * np.hypot(camera.width, camera.height)))  # photo px
         # Lengths on the ground, towards the viewer, look so much shorter.
         self._slope = float(np.clip(sine, LEAST_SLOPE, 1.0))
+
+    def is_above(self, horizon: float) -> bool:
+        """Whether its foot is seen above a row of the photo, px."""
+        foot = self.foot
+        return bool(foot[2] > 0 and self._camera.project(foot)[1] <= horizon)
 
     def grid(self, shadow: Shadow, cells: int = FINE) -> SilhouetteGrid | None:
         """About the whole shadow, at most so many `cells` long; None where none is seen."""
@@ -133,10 +151,15 @@ class StandingObject:
         width, height = (int(np.ceil((a + 2 * room) / pitch)) for a in (right - left, bottom - top))
         return SilhouetteGrid(left - room, top - room, pitch, width, height)
 
-    def far(self, shadow: Shadow, grid: SilhouetteGrid) -> F32:
-        """(h, w) of the light, what the whole object takes, in [0, 1]."""
-        high = self._above / self._height
-        cover, share = _spread(self._fallen(shadow), high, grid, self._camera)
+    def far(self, shadow: Shadow, grid: SilhouetteGrid, level: float = 0.0) -> F32:
+        """(h, w) of the light, what the whole object takes, in [0, 1].
+
+        At a `level` above the ground, world units: there what is higher throws the same shadow,
+        nearer. It is where its light would have met the ground.
+        """
+        is_higher = self._above >= level
+        high = (self._above[is_higher] - level) / self.height
+        cover, share = _spread(self._fallen(shadow)[is_higher], high, grid, self._camera)
         share, size = np.clip(share, 0, 1), self._size / grid.pitch
         mixed = np.zeros_like(cover)
         for k, blur in enumerate(BLURS):
@@ -148,7 +171,7 @@ class StandingObject:
 
     def contact(self, grid: SilhouetteGrid) -> F32:
         """(h, w) what touches the ground, blurred and a little lower, 1 at its darkest."""
-        low = 1 - self._above[self._is_low] / (BAND * self._height)
+        low = 1 - self._above[self._is_low] / (BAND * self.height)
         cover, share = _spread(self._feet[self._is_low], low, grid, self._camera)
         size = self._size / grid.pitch
         near = self._smooth(cover * share, BAND_BLUR * size)
@@ -157,10 +180,27 @@ class StandingObject:
         near[:drop] = 0
         return near / max(float(near.max()), 1e-6)
 
+    def ray(self, shadow: Shadow) -> F64:
+        """(3,) the way of the light, as long as it takes to come down by one world unit."""
+        return np.asarray(self.normal + self._way(shadow), np.float64)
+
+    def _way(self, shadow: Shadow) -> F64:
+        angle = np.radians(shadow.direction)
+        way = np.cos(angle) * self._right + np.sin(angle) * self._nearer
+        return np.asarray(shadow.length * way, np.float64)
+
+    @property
+    def foot(self) -> F64:
+        """(3,) amid where it touches the ground."""
+        return np.asarray(np.median(self._feet[self._is_low], 0), np.float64)
+
+    def lit(self, shadow: Shadow) -> F64:
+        """(N, 3) its points, and where the light through them meets the ground."""
+        return np.concatenate([self.points, self._fallen(shadow)])
+
     def _fallen(self, shadow: Shadow) -> F64:
         """(N, 3) where the shadow of each point is, on the ground."""
-        angle = np.radians(shadow.direction)
-        way = shadow.length * (np.cos(angle) * self._right + np.sin(angle) * self._nearer)
+        way = self._way(shadow)
         return np.asarray(self._feet + self._above[:, None] * way, np.float64)
 
     def _smooth(self, values: F32, sigma: float) -> F32:
@@ -221,13 +261,18 @@ def _spread(points: F64, values: F64, grid: SilhouetteGrid, camera: Camera) -> t
     return np.asarray(cover, np.float32), np.asarray(total / np.maximum(count, 1e-6), np.float32)
 
 
-def _shade(shadow: Shadow, light: F32, grid: SilhouetteGrid) -> Shade | None:
-    """Of the light (h, w) that is left, as a picture that ends clear."""
+def opacity(shadow: Shadow, far: F32, near: F32 | float) -> F32:
+    """How opaque a shadow is (h, w), of what the whole object takes and of what touches."""
+    light = np.asarray((1 - far) * (1 - np.float32(shadow.contact) * near), np.float32)
     alpha = 1 - (1 - DARKEST * shadow.strength * (1 - light)) ** (1 / GAMMA)
-    alpha = np.clip((alpha - FAINTEST) / (1 - FAINTEST), 0, 1).astype(np.float32)
+    return np.clip((alpha - FAINTEST) / (1 - FAINTEST), 0, 1).astype(np.float32)
+
+
+def trimmed(alpha: F32, grid: SilhouetteGrid, colour: tuple[float, float, float]) -> Shade | None:
+    """A shadow (h, w) as a picture that ends clear; None where all of it is."""
     rows, columns = np.flatnonzero(alpha.any(1)), np.flatnonzero(alpha.any(0))
     if not len(rows):
         return None
     alpha = np.pad(alpha[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], 1)
     left, top = grid.left + grid.pitch * (columns[0] - 1), grid.top + grid.pitch * (rows[0] - 1)
-    return Shade(alpha, float(left), float(top), grid.pitch, shadow.colour)
+    return Shade(alpha, float(left), float(top), grid.pitch, colour)

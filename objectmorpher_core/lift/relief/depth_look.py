@@ -44,6 +44,15 @@ def look(pixels: Pixels, mask: Mask) -> NetworkDepth | None:
         raise LiftError(f"{error}; without the depth model it can be lifted") from error
 
 
+def look_at_all(pixels: Pixels) -> F32 | None:
+    """(h, w) inverse depth of a photo (H, W, 3), see `Document.depth`; None without a network.
+
+    Raises LiftError where the network cannot look at that.
+    """
+    seen = look(pixels, np.ones(pixels.shape[:2], bool))
+    return None if seen is None else seen.inverse
+
+
 @dataclass(frozen=True)
 class There:
     """A depth network on this machine."""

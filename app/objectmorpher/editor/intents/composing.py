@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document import edits
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from ..tasks import Tasks
     from .methods import Methods
 
-VARIANTS, REPAIR, SHADOW = "variants", "repair", "shadow"  # kinds of jobs, besides PLATE
+# Kinds of jobs, besides PLATE.
+VARIANTS, REPAIR, SHADOW, DEPTH = "variants", "repair", "shadow", "depth"
 COUNT = 3  # variants
 USUAL_SHADOW = 0.55
 GRAIN = 2  # canvas px per px of the picture of a stroke
@@ -364,6 +365,25 @@ class Composing:
             is_new = item.shadow.strength == 0
             self.preview_shadow(replace(item.shadow, strength=USUAL_SHADOW if is_new else 0.0))
             self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
+
+    def toggle_depth(self) -> None:
+        """Shadows fall on what the depth model sees in the photo, or on plain ground again."""
+        editor, document = self._editor, self._editor.committed
+        if document is None:
+            return
+        if document.depth is not None:
+            editor.apply(t("Shadows on plain ground"), edits.set_depth(document, None))
+            return
+
+        def accept(depth: F32 | None) -> None:
+            now = editor.committed
+            if now is not None and now.photo is document.photo and depth is not None:
+                editor.apply(t("Shadows on walls and steps"), edits.set_depth(now, depth))
+
+        editor.jobs.start(
+            t("Looking how deep the photo is"), job_functions.look_at_depth,
+            document.photo.pixels, done=accept, failed=editor.complain_of, kind=DEPTH,
+        )  # fmt: skip
 
     def take_shadow(self) -> None:
         """Looks for its shadow in the photo, and outlines what it finds.
