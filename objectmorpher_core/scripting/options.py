@@ -309,8 +309,12 @@ class EditScript:
         "weight of the shape network, 0 (the outline alone) to 1 (default)",
     )  # fmt: skip
     no_depth: bool = _option(
-        False, FLAG, _SHAPE, None, "ignore the depth model even where one is installed"
-    )
+        False,
+        FLAG,
+        _SHAPE,
+        None,
+        "ignore the depth model, also for shadows, even where one is installed",
+    )  # fmt: skip
     hidden: str | None = _option(
         None, TEXT, _SHAPE, "M.png", "a mask of its parts that are hidden behind something"
     )

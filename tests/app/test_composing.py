@@ -259,6 +259,39 @@ def test_where_no_shadow_is_sure_it_is_said_and_nothing_changes(editor: Editor) 
     assert editor.message.text.startswith("No clear shadow")
 
 
+def test_a_shadow_falls_on_what_rests_as_it_is_exported(editor: Editor, ball: Document) -> None:
+    document = edits.set_placement(
+        edits.duplicate(ball, 0), 1, Placement(move=(-45.0, 40.0), scale=0.4)
+    )
+    document = edits.set_shadow(document, 1, Shadow(1.0, -30.0, 2.0, 0.1))
+    found = []
+    for is_hurried in (True, False):
+        cache = type(editor.cache)()
+        cache.frame_time = FRAME if is_hurried else np.inf
+        frame = build_frame(document, editor.view, cache, renderer="gl")
+        (own,) = (o for o in frame.objects if isinstance(o, FrameObject) and o.k == 0)
+        assert own.lit.is_shaded and own.lit.relit is not None
+        assert frame.blend is not None and frame.blend.max() == 1
+        found.append(float(own.lit.relit.factor.min()))
+    assert max(found) < -0.3 and abs(found[0] - found[1]) < 0.2
+    far = edits.set_placement(document, 1, Placement(move=(900.0, 40.0), scale=0.4))
+    frame = build_frame(far, editor.view, type(editor.cache)(), renderer="gl")
+    assert not any(isinstance(o, FrameObject) and o.lit.is_shaded for o in frame.objects)
+
+
+def test_walls_and_steps_are_asked_of_a_depth_model(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    run(editor, "depth")
+    wait_for_jobs(editor)
+    assert editor.document is ball and editor.message is not None
+    assert "depth model" in editor.message.text
+    editor.apply("Known", edits.set_depth(ball, np.ones((4, 5), np.float32)))
+    run(editor, "depth")
+    assert editor.document is not None and editor.document.depth is None
+    editor.undo()
+    assert editor.document.depth is not None
+
+
 def test_what_has_not_moved_keeps_its_shadow(editor: Editor, ball: Document) -> None:
     editor.start(ball)
     assert COMMANDS["take_shadow"].why_not(editor) == "Move the object first"

@@ -112,8 +112,6 @@ def _falls_on_depth(editor: Editor) -> bool:
 def _cannot_look(editor: Editor) -> str | None:
     if editor.jobs.is_busy(DEPTH):
         return t("The depth model is looking at the photo")
-    if not editor.models.has_depth and not _falls_on_depth(editor):
-        return t("This needs a depth model: Window > Models")
     return nothing_lifted(editor)
 
 

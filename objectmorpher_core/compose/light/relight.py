@@ -132,10 +132,11 @@ def relight(
         return None
     normals = turned_normals(splats)
     factors = _factors(splats, normals, strength * light)
+    means, body = splats.means, splats.means[sketched(splats)]
     asked = slice(None) if few is None else few
     for caster in casters:
         ink = float(np.mean(caster.shadow.colour))
-        factors[asked] *= 1 - (1 - ink) * caster.on(splats.means[asked], normals[asked])
+        factors[asked] *= 1 - (1 - ink) * caster.on(means[asked], normals[asked], body)
     if np.abs(factors - 1).max() < NOTHING:
         return None
     if few is None:

@@ -21,10 +21,11 @@ from ...base.arrays import F32, F64, Mask
 from ...base.camera import Camera
 from ...document.settings import Shadow
 from ..silhouette import SilhouetteGrid, box_around
-from .shadow import BAND, FINE, SPRAY, Shade, StandingObject, cast, opacity, trimmed
+from .shadow import BAND, FINE, SPRAY, FlatShadow, Shade, StandingObject, opacity, trimmed
 from .shadow_fit import regressed
 
 HEIGHTS = (0.0, BAND, 0.2, 0.4, 0.6, 0.8, 1.0)  # x the caster's, above the ground
+ROUGH = (0.0, BAND, 0.5, 1.0)  # the same, of a sketch
 TERMINATOR = 0.2  # cosine with the light's way, over which a surface turns out of it
 AT_FOOT = 0.08  # x the caster's height: what is seen so near its foot may carry it
 FLAT = 0.06  # x the caster's height: what rises less is the ground
@@ -47,8 +48,10 @@ class Caster:
     @cached_property
     def shade(self) -> Shade | None:
         """What falls on the ground, and on what rises from it; None where nothing does."""
-        plain = cast(self.shadow, self.standing, self.cells, self.horizon)
-        if self.seen is None or self.standing.depth <= 0 or self._volume is None:
+        if self._flat is None:
+            return None
+        plain = self._flat.shade(self.shadow, self.standing, self.horizon)
+        if self.seen is None or self.standing.depth <= 0:
             return plain
         if (corners := self._box) is None or (scale := self._scale()) is None:
             return plain
@@ -119,13 +122,13 @@ class Caster:
             return False
         return all(own[0][a] < other[1][a] and other[0][a] < own[1][a] for a in (0, 1))
 
-    def on(self, points: F64, normals: F64) -> F32:
+    def on(self, points: F64, normals: F64, body: F64) -> F32:
         """(N,) in [0, 1], how much of the shadow falls on an object's surface.
 
-        Its `points` and outward `normals` (N, 3) are the world's.
+        Its `points` and outward `normals` (N, 3) are the world's; `body` (M, 3): what is solid.
         """
-        times = self._beside(points)
-        if times is None or self._volume is None:
+        times = self._beside(body)
+        if times is None or self._flat is None:
             return np.zeros(len(points), np.float32)
         ray = self.standing.ray(self.shadow)
         facing = np.clip(-(normals @ ray) / (TERMINATOR * np.linalg.norm(ray)), 0, 1)
@@ -151,31 +154,33 @@ class Caster:
         return standing.depth / depth if min(depth, standing.depth) > 0 else None
 
     @cached_property
-    def _volume(self) -> tuple[SilhouetteGrid, F32] | None:
-        """Where the light would meet the ground, and how opaque the shadow is (levels, h, w)."""
-        standing, shadow = self.standing, self.shadow
-        grid = standing.grid(shadow, self.cells)
-        if grid is None or shadow.strength <= 0:
-            return None
-        near = standing.contact(grid)
-        levels = [
-            opacity(
-                shadow, standing.far(shadow, grid, share * standing.height), near * (share == 0)
-            )
-            for share in HEIGHTS[:-1]
-        ]
-        return grid, np.stack([*levels, np.zeros_like(near)])
+    def _flat(self) -> FlatShadow | None:
+        return FlatShadow.of(self.shadow, self.standing, self.cells)
+
+    @cached_property
+    def _volume(self) -> F32:
+        """(levels, h, w) how opaque it is where the light would meet the ground."""
+        assert self._flat is not None
+        standing, shadow, grid = self.standing, self.shadow, self._flat.grid
+        levels = [self._flat.alpha]
+        for share in self._heights[1:-1]:
+            far = standing.far(shadow, grid, share * standing.height)
+            levels.append(opacity(shadow, far, 0.0))
+        return np.stack([*levels, np.zeros_like(self._flat.alpha)])
+
+    @property
+    def _heights(self) -> tuple[float, ...]:
+        return HEIGHTS if self.cells >= FINE else ROUGH
 
     def _opacity(self, met: F64, high: F64) -> F32:
         """(N,) how opaque it is `high` (N,) above where its light meets the ground (N, 3)."""
         found = np.zeros(len(met), np.float32)
-        if self._volume is None:
-            return found
-        grid, levels = self._volume
+        assert self._flat is not None
+        grid, heights = self._flat.grid, self._heights
         there = np.flatnonzero(met[:, 2] > 0)
         x, y = ((self.camera.project(met[there]) - (grid.left, grid.top)) / grid.pitch - 0.5).T
         level = np.interp(
-            high[there] / self.standing.height, HEIGHTS, np.arange(len(HEIGHTS), dtype=np.float64)
+            high[there] / self.standing.height, heights, np.arange(len(heights), dtype=np.float64)
         )
-        found[there] = map_coordinates(levels, [level, y, x], order=1, mode="constant")
+        found[there] = map_coordinates(self._volume, [level, y, x], order=1, mode="constant")
         return found

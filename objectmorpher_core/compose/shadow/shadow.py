@@ -89,15 +89,37 @@ def cast(
 
     Where the row of the photo is known that the `horizon` lies in, px, it ends there.
     """
-    if shadow.strength <= 0 or (grid := standing.grid(shadow, cells)) is None:
-        return None
-    if horizon is not None and standing.is_above(horizon):  # it is in the air
-        return None
-    alpha = opacity(shadow, standing.far(shadow, grid), standing.contact(grid))
-    if horizon is not None:
-        rows = grid.top + grid.pitch * (np.arange(grid.height) + 0.5)
-        alpha[rows <= horizon + grid.pitch] = 0
-    return trimmed(alpha, grid, shadow.colour)
+    lying = FlatShadow.of(shadow, standing, cells)
+    return None if lying is None else lying.shade(shadow, standing, horizon)
+
+
+@dataclass(frozen=True, eq=False)
+class FlatShadow:
+    """A shadow on plain ground."""
+
+    grid: SilhouetteGrid
+    contact: F32  # (h, w) see `StandingObject.contact`
+    alpha: F32  # (h, w)
+
+    @staticmethod
+    def of(shadow: Shadow, standing: StandingObject, cells: int) -> FlatShadow | None:
+        """The shadow, of at most so many `cells`; None where there is none."""
+        if shadow.strength <= 0 or (grid := standing.grid(shadow, cells)) is None:
+            return None
+        far, near = standing.far(shadow, grid), standing.contact(grid)
+        return FlatShadow(grid, near, opacity(shadow, far, near))
+
+    def shade(
+        self, shadow: Shadow, standing: StandingObject, horizon: float | None
+    ) -> Shade | None:
+        """As a picture that ends at the `horizon`, see `cast`."""
+        grid, alpha = self.grid, self.alpha
+        if horizon is not None:
+            if standing.is_above(horizon):  # it is in the air
+                return None
+            rows = grid.top + grid.pitch * (np.arange(grid.height) + 0.5)
+            alpha = alpha * (rows > horizon + grid.pitch)[:, None].astype(np.float32)
+        return trimmed(alpha, grid, shadow.colour)
 
 
 class StandingObject:

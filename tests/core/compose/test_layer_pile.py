@@ -100,6 +100,24 @@ def test_a_shadow_is_a_layer_of_its_own():
     assert shadow.pixels[..., 3].max() > 60
 
 
+def test_a_shadow_on_another_thing_is_in_its_layer():
+    resting = shapes.scene("disc").document()
+    document = edits.set_placement(
+        edits.duplicate(resting, 0), 1, Placement(move=(-45.0, 35.0), scale=0.5)
+    )
+    shaded = edits.set_shadow(document, 1, Shadow(1.0, -40.0, 1.5, 0.1))
+    difference, pixels, _ = off(shaded)
+    assert difference.max() <= OFF
+    plain = composite(document).pixels.astype(int)
+    x0, y0, x1, y1 = resting.objects[0].matte.box
+    darker = (plain - pixels)[y0:y1, x0:x1][resting.objects[0].matte.alpha >= 1].mean(-1)
+    assert (darker > 20).sum() > 100 and darker.min() > -1
+    assert (darker < 1).mean() > 0.4, "beside the shadow it is as it was"
+    assert composite(shaded).outside_footprint_changed == 0
+    opened = decode_session(encode_session(shaded))
+    assert np.array_equal(composite(opened).pixels, pixels)
+
+
 def test_copies_are_layers_and_what_is_hidden_is_none():
     document = moved(shapes.scene("ellipse").document(), MOVES["moved"])
     copy = replace(document.objects[0], name="Copy", placement=Placement(move=(-22.0, 9.0)))

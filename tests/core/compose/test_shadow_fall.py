@@ -151,7 +151,7 @@ def test_another_object_is_hit_where_rays_say() -> None:
     caster = Caster(SHARP, BOARD.standing, CAMERA)
     truth = BOARD.hides(other[None], SHARP)[0]
     for times in (1.0, 0.8):
-        found = caster.on(times * other, normals)
+        found = caster.on(times * other, normals, times * other)
         assert truth.any() and overlap(found > 0.4 * found.max(), truth) > 0.75
-    assert not caster.on(other, -normals).any()  # its far side has no light to lose
-    assert not caster.on(other + [3.0, 0, 0], normals).any()
+    assert not caster.on(other, -normals, other).any()  # its far side has no light to lose
+    assert not caster.on(other + [3.0, 0, 0], normals, other).any()

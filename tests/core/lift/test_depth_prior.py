@@ -11,16 +11,18 @@ import pytest
 from objectmorpher_core import models
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.edits import EditError, set_depth, show_the_same
 from objectmorpher_core.document.model import LiftedObject, LiftSettings
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, ReliefBody
-from objectmorpher_core.lift.relief.depth_look import box_around
+from objectmorpher_core.lift.relief.depth_look import box_around, look_at_all
 from objectmorpher_core.lift.relief.depth_prior import NetworkDepth, align, follow, membrane
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte
+from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 from tests.core.models.small_networks import brightness, constant
 
@@ -40,6 +42,19 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def install(tmp_path: Path, network: bytes) -> None:
     (tmp_path / "net.onnx").write_bytes(network)
     models.add("depth", tmp_path / "net.onnx")
+
+
+def test_a_look_at_the_whole_photo_is_kept_in_its_document(tmp_path: Path) -> None:
+    document = shapes.scene("disc").document()
+    assert look_at_all(document.photo.pixels) is None
+    install(tmp_path, brightness())
+    known = set_depth(document, look_at_all(document.photo.pixels))
+    opened = decode_session(encode_session(known))
+    assert known.depth is not None and opened.depth is not None
+    assert np.array_equal(known.depth, opened.depth)
+    assert not show_the_same(document, known)
+    with pytest.raises(EditError, match="a number for each"):
+        set_depth(document, np.full((3, 4), np.nan, np.float32))
 
 
 def lifted(settings: LiftSettings, pixels: np.ndarray | None = None) -> LiftedObject:

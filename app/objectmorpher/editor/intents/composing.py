@@ -377,7 +377,9 @@ class Composing:
 
         def accept(depth: F32 | None) -> None:
             now = editor.committed
-            if now is not None and now.photo is document.photo and depth is not None:
+            if depth is None:
+                editor.say(t("Walls and steps are seen by a depth model: Window > Models"))
+            elif now is not None and now.photo is document.photo:
                 editor.apply(t("Shadows on walls and steps"), edits.set_depth(now, depth))
 
         editor.jobs.start(

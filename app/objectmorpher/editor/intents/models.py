@@ -167,8 +167,9 @@ class Models:
 
     @property
     def has_depth(self) -> bool:
-        """Return whether a depth model shapes the relief of lifted objects, where wanted."""
-        return any(own.kind.id == DEPTH and own.state == "ok" for own in self.added)
+        """Return whether a depth model is there, of the user's or of ours."""
+        is_ours = any(s.model.stage == DEPTH and s.state == "ok" for s in self.hub.states)
+        return is_ours or any(own.kind.id == DEPTH and own.state == "ok" for own in self.added)
 
     @property
     def has_shape(self) -> bool:

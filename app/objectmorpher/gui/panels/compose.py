@@ -25,7 +25,7 @@ from objectmorpher_core.document.settings import (
     USUAL_RELIGHT,
 )
 
-from ...commands import COMMANDS, run
+from ...commands import run
 from ...commands.compose import not_moved
 from ...editor.editor import Editor
 from ...editor.view import Composed
@@ -200,8 +200,8 @@ def _draw_shadow(editor: Editor) -> None:
     changed = replace(shadow, ground=ground)
     _take(editor, change, lambda: preview(changed), t("Ground of shadow"))
     _draw_direction(editor)
-    if COMMANDS["depth"].why_not(editor) is None:
-        is_on = bool(editor.document and editor.document.depth is not None)
+    is_on = bool(editor.document and editor.document.depth is not None)
+    if editor.models.has_depth or is_on:
         if checkbox(t("Falls on walls and steps"), is_on) != is_on:
             editor.composing.toggle_depth()
         tooltip(t("As the depth model sees them in the photo, not on plain ground alone"))
