@@ -154,7 +154,7 @@ class Lighting:
         shadows.
         """
         others = [caster for k, caster in casters if k != number]
-        if others:
+        if others and not is_sketch:  # a frame's are near already
             few = splats.means[sketched(splats)]
             others = [caster for caster in others if caster.reaches(few)]
         if not item.is_moved:

@@ -22,7 +22,7 @@ from ...raster import tiles
 from ...raster.posed import PosedSplats
 from ...raster.texture import build_levels
 from ..shadow.fall import Caster
-from ..silhouette import SilhouetteGrid, cell_places, fine_grid, sketch_grid, sketched
+from ..silhouette import SKETCHED, SilhouetteGrid, cell_places, fine_grid, sketch_grid, sketched
 
 LEAST, MOST = 0.6, 1.6  # factor of encoded values
 SEEN = 0.05  # cosine with the direction to the viewer, from which a surface counts
@@ -31,6 +31,8 @@ SMOOTH = 1.5  # px of a sketch
 BITS = 16  # of a factor's fraction, where pixels are bytes
 FAINT = 1e-3  # of the weight of what is continued
 LEAST_ROWS = 128  # of a picture, for which a second thread is woken
+EVERY = slice(None)
+SHADED = 1500  # Gaussians in a sketch of what others shade
 FILLED = 3.0  # px of the picture of factors, over which they are continued beyond the object
 
 # What painted Gaussians ask nothing of.
@@ -126,30 +128,35 @@ def relight(
     `light` (3,): of `estimate_light`. `is_sketch`: coarser, in the time that a frame of a drag has.
     `casters`: other objects, whose shadows fall on it.
     """
-    few = sketched(splats) if is_sketch else None
+    few = sketched(splats, SHADED if strength == 0 else SKETCHED) if is_sketch else None
     grid = fine_grid(splats, camera) if few is None else sketch_grid(splats, few, camera)
     if grid is None:
         return None
-    normals = turned_normals(splats)
-    factors = _factors(splats, normals, strength * light)
-    means, body = splats.means, splats.means[sketched(splats)]
-    asked = slice(None) if few is None else few
+    asked = EVERY if few is None else few
+    means, normals = splats.means[asked], turned_normals(splats, asked)
+    factors = _factors(splats.rest.shown_normals[asked], normals, strength * light)
     for caster in casters:
         ink = float(np.mean(caster.shadow.colour))
-        factors[asked] *= 1 - (1 - ink) * caster.on(means[asked], normals[asked], body)
+        body = splats.means[sketched(splats, SHADED)]
+        factors *= 1 - (1 - ink) * caster.on(means, normals, body)
     if np.abs(factors - 1).max() < NOTHING:
         return None
     if few is None:
         picture = _drawn(splats, factors, grid, camera)
     else:
-        picture = _sketched(splats.means[few], normals[few], factors[few], grid, camera)
+        picture = _sketched(means, normals, factors, grid, camera)
     return Relit(picture - 1, grid.left, grid.top, grid.pitch)
 
 
-def turned_normals(splats: PosedSplats) -> F64:
-    """(N, 3) outward, world, unit: where the normals at rest are now, by the cofactors of F."""
-    normals = splats.rest.normals @ splats.rest.world_from_object[:3, :3]  # along the object's axes
-    turned = _by_cofactors(np.ascontiguousarray(splats.skinned.linear, np.float64), normals)
+def turned_normals(splats: PosedSplats, asked: np.ndarray | slice = EVERY) -> F64:
+    """(N, 3) outward, world, unit: where the normals at rest are now, by the cofactors of F.
+
+    Of the Gaussians `asked` for.
+    """
+    axes = splats.rest.world_from_object[:3, :3]
+    normals = splats.rest.normals[asked] @ axes  # along the object's axes
+    linear = np.ascontiguousarray(splats.skinned.linear[asked], np.float64)
+    turned = _by_cofactors(linear, normals)
     turned = turned @ splats.world_from_object[:3, :3].T  # a similarity
     return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
 
@@ -170,9 +177,9 @@ def _by_cofactors(linear, vectors):
     return out
 
 
-def _factors(splats: PosedSplats, normals: F64, light: F64) -> F64:
-    """(N,) what each of the Gaussians is multiplied by, whose `normals` are those (N, 3) now."""
-    turned = normals - splats.rest.shown_normals
+def _factors(shown: F64, normals: F64, light: F64) -> F64:
+    """(N,) what Gaussians are multiplied by whose `normals` (N, 3) were `shown` in the photo."""
+    turned = normals - shown
     return np.clip(np.exp(turned @ light), LEAST, MOST)
 
 

@@ -25,12 +25,14 @@ from .shadow import BAND, FINE, SPRAY, FlatShadow, Shade, StandingObject, opacit
 from .shadow_fit import regressed
 
 HEIGHTS = (0.0, BAND, 0.2, 0.4, 0.6, 0.8, 1.0)  # x the caster's, above the ground
-ROUGH = (0.0, BAND, 0.5, 1.0)  # the same, of a sketch
+ROUGH = (0.0, 0.5, 1.0)  # the same, of a sketch
 TERMINATOR = 0.2  # cosine with the light's way, over which a surface turns out of it
 AT_FOOT = 0.08  # x the caster's height: what is seen so near its foot may carry it
 FLAT = 0.06  # x the caster's height: what rises less is the ground
 FARTHEST = 40.0  # x as far as the foot: no shadow is seen there
 LOOKED = 24  # places across the ground before a foot, and as many along it
+EIGHTH = 8  # one point in so many tells where a shadow is
+ROOM = 0.15  # x the caster's height, around those
 FEWEST = 4  # Gaussians that must be seen there
 
 
@@ -138,7 +140,9 @@ class Caster:
 
     @cached_property
     def _box(self) -> tuple[tuple[float, float], tuple[float, float]] | None:
-        return box_around(self.standing.lit(self.shadow), self.camera, 0.0)
+        """Around most of what lies between the object and where its shadow falls, photo px."""
+        few = self.standing.lit(self.shadow)[::EIGHTH]
+        return box_around(few, self.camera, ROOM * self.standing.height)
 
     def _beside(self, points: F64) -> float | None:
         """X its distance, how far away another object is; None where it has no ground with this."""

@@ -2,7 +2,7 @@
 
 The ground is a plane under the object's lowest Gaussians. What is h above it throws its shadow
 h x length x (cos, sin) of the direction from its foot, on the ground: the object's own depth is in
-it, so a thing that turns throws another shadow. The farther from the ground, the more blurred and
+it, so a thing that turns throws another shadow. What it meets before the ground: `fall`. The farther from the ground, the more blurred and
 the weaker. Right below what stands on it lies a dark band, the contact.
 
 How steeply one looks down on the ground follows from the photo's horizon, where that is known;
