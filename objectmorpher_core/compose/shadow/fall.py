@@ -53,7 +53,7 @@ class Caster:
         if self._flat is None:
             return None
         plain = self._flat.shade(self.shadow, self.standing, self.horizon)
-        if self.seen is None or self.standing.depth <= 0:
+        if self.seen is None or min(self.standing.depth, self.standing.foot[2]) <= 0:
             return plain
         if (corners := self._box) is None or (scale := self._scale()) is None:
             return plain

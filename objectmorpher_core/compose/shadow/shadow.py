@@ -2,8 +2,9 @@
 
 The ground is a plane under the object's lowest Gaussians. What is h above it throws its shadow
 h x length x (cos, sin) of the direction from its foot, on the ground: the object's own depth is in
-it, so a thing that turns throws another shadow. What it meets before the ground: `fall`. The farther from the ground, the more blurred and
-the weaker. Right below what stands on it lies a dark band, the contact.
+it, so a thing that turns throws another shadow. The farther from the ground, the more blurred and
+the weaker. Right below what stands on it lies a dark band, the contact. What the light meets before
+the ground, `fall` knows.
 
 How steeply one looks down on the ground follows from the photo's horizon, where that is known;
 else the artist says it. Nothing is known of the light: the artist says that, too, or the shadow
@@ -286,7 +287,8 @@ def _spread(points: F64, values: F64, grid: SilhouetteGrid, camera: Camera) -> t
 def opacity(shadow: Shadow, far: F32, near: F32 | float) -> F32:
     """How opaque a shadow is (h, w), of what the whole object takes and of what touches."""
     light = np.asarray((1 - far) * (1 - np.float32(shadow.contact) * near), np.float32)
-    alpha = 1 - (1 - DARKEST * shadow.strength * (1 - light)) ** (1 / GAMMA)
+    left = 1 - DARKEST * shadow.strength * (1 - light)
+    alpha = 1 - np.maximum(left, 0) ** (1 / GAMMA)  # blurs of several widths may take over all
     return np.clip((alpha - FAINTEST) / (1 - FAINTEST), 0, 1).astype(np.float32)
 
 

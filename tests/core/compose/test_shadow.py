@@ -10,7 +10,12 @@ import pytest
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import stand
-from objectmorpher_core.compose.shadow.shadow import StandingObject, cast, ground_normal
+from objectmorpher_core.compose.shadow.shadow import (
+    StandingObject,
+    cast,
+    ground_normal,
+    opacity,
+)
 from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
@@ -65,6 +70,7 @@ def test_a_shadow_ends_clear_and_is_never_more_than_all():
         assert shade.alpha.min() >= 0 and shade.alpha.max() <= 1
         border = (shade.alpha[0], shade.alpha[-1], shade.alpha[:, 0], shade.alpha[:, -1])
         assert not any(edge.any() for edge in border)
+    assert opacity(Shadow(1.0), np.full((1, 1), 1.3, np.float32), 1.0) == 1
 
 
 def test_a_stronger_shadow_is_darker_and_a_softer_one_less_steep():
