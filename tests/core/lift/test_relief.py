@@ -29,9 +29,7 @@ COUNT = 3000  # Gaussians of each mask: one lift for all that is seen of it
 masks = pytest.mark.parametrize("name", shapes.MASKS)
 
 
-def _lift(
-    inside: np.ndarray, count: int = 800, seed: int = 0, trust: float = 0.0
-) -> LiftedObject:
+def _lift(inside: np.ndarray, count: int = 800, seed: int = 0, trust: float = 0.0) -> LiftedObject:
     """By its silhouette alone, unless there is `trust` in the shape network."""
     height, width = inside.shape
     camera, settings = Camera.from_fov(width, height), LiftSettings(count, trust=trust)
