@@ -26,7 +26,7 @@ from objectmorpher_core.compose.plate.structure_lines import draw_lines, find_li
 from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment.salience import SubjectNet
 from tests import focussed
-from tests.tree import quick
+from tests.tree import over, quick
 
 SIZE = 160  # px
 LEAST_BESIDE = 0.22  # x the roughness beside, mean of three draws, which differ by 0.1; was 0.11
@@ -34,6 +34,7 @@ LEAST_BESIDE = 0.22  # x the roughness beside, mean of three draws, which differ
 Y, X = np.mgrid[:SIZE, :SIZE]
 HOLE = np.hypot(X - 80, Y - 80) < 26
 without_weights = pytest.mark.usefixtures("without_weights")
+needs_network = pytest.mark.skipif(SubjectNet().missing() is not None, reason="needs U^2-Net-p")
 
 
 def noisy(levels: np.ndarray, seed: int = 0) -> np.ndarray:
@@ -144,7 +145,16 @@ def test_a_colour_that_is_not_around_the_hole_is_unlikely():
     assert share[inner].min() > 0.5 and share[~red & (X > 82)].mean() < 0.1
 
 
-@pytest.mark.skipif(SubjectNet().missing() is not None, reason="needs U^2-Net-p")
+@needs_network
+@over("shape", [(1, 2), (40, 1)])
+def test_the_network_looks_at_tiny_pictures_too(shape):
+    hole = np.zeros(shape, bool)
+    hole[-1, -1] = True
+    cost = unlikely(np.full((*shape, 3), 90, np.float32), hole)
+    assert cost.shape == shape and np.isfinite(cost).all()
+
+
+@needs_network
 def test_a_face_beside_the_hole_is_unlikelier_than_the_wall(astronaut):
     small = cv2.resize(astronaut, (256, 256), interpolation=cv2.INTER_AREA).astype(np.float32)
     y, x = np.mgrid[:256, :256]
