@@ -13,7 +13,7 @@ from tests.fuzz.readers import by_name, readers
 
 FOUND = Path(__file__).parent / "found"  # files that once did worse
 SLOW = ("drawn-session",)  # what is drawn has to be compiled first
-EACH = 2  # files of each reader
+EACH = 3  # files of each reader
 MANY = 15  # the same files each time: new ones are for `make fuzz`
 
 pytestmark = pytest.mark.skipif(
