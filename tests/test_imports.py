@@ -68,9 +68,9 @@ def _imports(path: Path, is_at_import: bool) -> Iterator[str]:
             module = ".".join((*above, *([node.module] if node.module else [])))
             yield module
             yield from (f"{module}.{alias.name}" for alias in node.names)
-        is_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+        is_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         if not (is_at_import and (is_function or _is_for_types(node))):
-            nodes.extend(ast.iter_child_nodes(node))
+            nodes.extend(n for n in ast.iter_child_nodes(node) if not isinstance(n, ast.expr))
 
 
 def _is_for_types(node: ast.AST) -> bool:

@@ -27,7 +27,7 @@ from objectmorpher_core.document.hold_edits import Stays
 from objectmorpher_core.document.model import Document, EditObject, Placement
 from strokes import stroke
 
-SESSIONS = int(os.environ.get("SESSIONS", "6"))
+SESSIONS = int(os.environ.get("SESSIONS", "3"))
 ACTIONS = 9
 SHOWN = 500 / (2 * RADII[1])  # x: the ball as an object that is 500 px large
 SAME = 0.05  # px of it

@@ -26,7 +26,7 @@ def document(turn: tuple[float, float, float] = (0, 0, 0)) -> Document:
     return set_placement(replace(found, objects=(item,)), 0, Placement(turn=turn, scale=1.3))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=6)
 @given(st.tuples(*[st.floats(-60, 60)] * 3), st.tuples(*[st.floats(-0.05, 0.05)] * 3))
 def test_a_handle_goes_where_the_file_has_it_and_the_others_stay(
     turn: tuple[float, float, float], shift: tuple[float, float, float]

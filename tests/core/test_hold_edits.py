@@ -108,7 +108,7 @@ def motion(document: Document, deformer: Deformer) -> float:
 
 
 @pytest.mark.parametrize(
-    ("body", "sessions"), quick([(False, 150), (True, 40), (False, SESSIONS), (True, 200)], 2)
+    ("body", "sessions"), quick([(False, 50), (True, 15), (False, SESSIONS), (True, 200)], 2)
 )
 def test_in_random_sessions_nothing_moves_but_what_is_dragged(body: bool, sessions: int):
     random = np.random.default_rng(4)
@@ -125,9 +125,10 @@ def test_in_random_sessions_nothing_moves_but_what_is_dragged(body: bool, sessio
     assert max(most) < SAME, (int(np.argmax(most)), max(most) / PIXEL)
 
 
-def test_handles_are_met_from_any_pose_and_the_way_back_is_the_same():
+@pytest.mark.parametrize("seeds", quick([6, 40], 1))
+def test_handles_are_met_from_any_pose_and_the_way_back_is_the_same(seeds: int):
     random = np.random.default_rng(1)
-    for _ in range(20):
+    for _ in range(seeds):
         document, deformer = opened()
         document = dragged(added(document, deformer, random), deformer, random)
         document = changed(added(document, deformer, random), deformer, random)

@@ -34,7 +34,7 @@ def folder(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("line", quick(ONCE, 1))
+@pytest.mark.parametrize("line", quick(sorted(ONCE, key=lambda line: ONCE[line] == "done"), 2))
 def test_what_once_ended_in_a_traceback(line, folder, monkeypatch) -> None:
     monkeypatch.chdir(folder)
     how, why = options.verdict(line.split())

@@ -16,7 +16,7 @@ from objectmorpher_core.document.model import Document, Photo, Placement
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import make_plate
 from tests import shapes
-from tests.tree import over
+from tests.tree import over, quick
 
 WIDTH, HEIGHT = 320, 160  # px
 MIDDLE, RADIUS = (80.0, 78.0), 45.0  # px, of a disc in the left half
@@ -55,9 +55,9 @@ def _moved(kind: str, blur: float) -> tuple[Document, Puppet]:
     return edits.set_plate(document, plate), scene.puppet
 
 
+@pytest.mark.parametrize("place", quick(PLACES, 3))
 @over("blur", [0.6, 2.0])
 @over("kind", KINDS)
-@over("place", PLACES)
 def test_on_its_own_colour_its_edge_is_not_seen(kind, place, blur):
     document, puppet = _moved(kind, blur)
     level = KINDS[kind][1]

@@ -18,7 +18,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import DeformSettings, Document, Placement
 from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
-from tests.tree import over
+from tests.tree import quick
 
 WIDTH, HEIGHT = 320, 200  # px
 MIDDLE, RADIUS = (90.0, 100.0), 70.0  # px, of a disc
@@ -74,8 +74,9 @@ def _power(patch: np.ndarray) -> tuple[np.ndarray, float]:
     return np.array(mean), float(rest.var())
 
 
-@over("blur", [0.0, 0.6])
-@over("place", PLACES)
+@pytest.mark.parametrize(
+    ("place", "blur"), quick(((place, blur) for blur in (0.6, 0.0) for place in PLACES), 5)
+)
 def test_a_moved_object_is_as_noisy_as_the_photo(place, blur):
     document, puppet = _scene(blur)
     moved = edits.set_placement(document, 0, PLACES[place])

@@ -16,8 +16,12 @@ LEARNED = tiny_inpainters.FAMILIES
 
 @pytest.fixture(scope="module", params=quick(sorted(BACKENDS, key=lambda n: n == "pixelhacker"), 4))
 def inpainter(request, tmp_path_factory):
-    """Each; those that learned something are tiny networks of random weights."""
+    """Each; those that learned something are tiny networks of random weights.
+
+    The others have no network that looks at what is to be filled: see `without_weights`.
+    """
     with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("OBJECTMORPHER_CACHE", str(tmp_path_factory.mktemp("none")))
         if request.param in LEARNED:
             tiny_inpainters.bring(request.param, tmp_path_factory.mktemp("tiny"), patch)
         yield load(request.param)
@@ -32,7 +36,7 @@ def is_trained(inpainter) -> bool:
 def hole(view):
     """About the rocket, and away from the frame."""
     hole = np.zeros(view.shape[:2], bool)
-    hole[10:200, 90:150] = True
+    hole[5:100, 45:75] = True
     return hole
 
 
@@ -68,9 +72,9 @@ def test_the_rocket_is_gone(inpainter, view, hole):
         pytest.skip("random weights invent nothing that fits")
     filled = inpainter.inpaint(view, hole, silent).astype(float)
     sky = np.zeros_like(hole)
-    sky[20:90, 40:80] = True
+    sky[10:45, 20:40] = True
     filling = np.zeros_like(hole)
-    filling[20:90, 95:145] = True
+    filling[10:45, 48:72] = True
     assert view[filling].mean() > 60
     np.testing.assert_allclose(filled[filling].mean(0), filled[sky].mean(0), atol=12)
 
@@ -86,8 +90,8 @@ def test_what_the_hole_hides_does_not_matter(inpainter, view, hole):
 
 def test_hole_at_the_frame(inpainter, view):
     hole = np.zeros(view.shape[:2], bool)
-    hole[:, :70] = True
-    hole[-30:] = True
+    hole[:, :35] = True
+    hole[-15:] = True
     filled = inpainter.inpaint(view, hole, silent)
     np.testing.assert_array_equal(filled[~hole], view[~hole])
 
@@ -127,10 +131,12 @@ def test_cancel(inpainter, view, hole):
         inpainter.inpaint(view, hole, stop)
 
 
+@pytest.mark.usefixtures("without_weights")
 def test_seed_changes_the_result(coffee):
-    hole = np.zeros(coffee.shape[:2], bool)
-    hole[320:380, 480:560] = True
-    results = [load("patchmatch").inpaint(coffee, hole, silent, seed) for seed in (0, 1)]
+    table = coffee[290:, 440:]
+    hole = np.zeros(table.shape[:2], bool)
+    hole[30:90, 40:120] = True
+    results = [load("patchmatch").inpaint(table, hole, silent, seed) for seed in (0, 1)]
     assert not np.array_equal(*results)
 
 
@@ -147,6 +153,7 @@ def test_detail_is_the_photos_own(china):
     assert 0.75 < roughness(filled, inner) / roughness(large, around) < 1.25
 
 
+@pytest.mark.usefixtures("without_weights")
 def test_16_bit_gradient_shows_no_bands():
     """A sky finer than 8 bits: the fill has in-between values, and no step above the photo's."""
     ramp = np.linspace(20000, 23000, 240)[:, None, None]
@@ -154,10 +161,9 @@ def test_16_bit_gradient_shows_no_bands():
     sky = np.rint(ramp + noise).astype(np.uint16)
     hole = np.zeros(sky.shape[:2], bool)
     hole[90:150, 120:180] = True
-    filled = load("patchmatch").inpaint(sky, hole, silent)[hole]
+    filled = load("patchmatch").inpaint(sky, hole, silent)[90:150, 120:180]
     assert len(np.unique(filled)) > 500
-    means = load("patchmatch").inpaint(sky, hole, silent)[90:150, 120:180].mean((1, 2))
-    np.testing.assert_allclose(means, ramp[90:150, 0, 0], atol=257)
+    np.testing.assert_allclose(filled.mean((1, 2)), ramp[90:150, 0, 0], atol=257)
 
 
 @over("kind", [np.uint8, np.uint16])
@@ -167,9 +173,9 @@ def test_black_and_white_stay_black_and_white(inpainter, kind, share):
     if not is_trained(inpainter):
         pytest.skip("random weights invent nothing that fits")
     level = kind(share * np.iinfo(kind).max)
-    plain = np.full((120, 140, 3), level, kind)
-    y, x = np.mgrid[:120, :140]
-    hole = np.hypot(x - 70, y - 60) < 40
+    plain = np.full((60, 70, 3), level, kind)
+    y, x = np.mgrid[:60, :70]
+    hole = np.hypot(x - 35, y - 30) < 20
     plain[hole] = kind(np.iinfo(kind).max) - level
     filled = inpainter.inpaint(plain, hole, silent).astype(float)
     assert np.abs(filled - float(level)).max() <= 0.02 * np.iinfo(kind).max

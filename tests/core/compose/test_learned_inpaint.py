@@ -32,7 +32,7 @@ HALF = 0.06  # bfloat16 has 8 bits, and nineteen steps
 @pytest.fixture
 def hole(view):
     hole = np.zeros(view.shape[:2], bool)
-    hole[60:140, 90:150] = True
+    hole[30:70, 45:75] = True
     return hole
 
 

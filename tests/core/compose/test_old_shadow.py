@@ -42,7 +42,7 @@ def _found(pixels: np.ndarray) -> OldShadow:
     return old
 
 
-@pytest.mark.parametrize(("direction", "length"), WAYS)
+@pytest.mark.parametrize(("direction", "length"), quick(WAYS[::-1], 2))
 def test_a_shadow_is_found_with_its_direction_and_length(direction, length):
     shadow = _found(photo_of(thrown(direction, length))).shadow
     assert abs((shadow.direction - direction + 180) % 360 - 180) < 25
@@ -64,7 +64,7 @@ def test_what_is_known_of_the_ground_is_used():
 
 
 @pytest.mark.parametrize(("direction", "length"), quick(WAYS, 1))
-@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("bits", quick([16, 8], 1))
 def test_it_is_lifted_off_the_ground_that_stays_as_it_is(direction, length, bits):
     shade = thrown(direction, length)
     dark, lit = photo_of(shade), photo_of(None)
@@ -85,7 +85,7 @@ def test_it_is_lifted_off_the_ground_that_stays_as_it_is(direction, length, bits
     assert np.corrcoef(fine[0][true].ravel(), fine[1][true].ravel())[0, 1] > 0.8
 
 
-@pytest.mark.parametrize("seed", quick(range(4), 2))
+@pytest.mark.parametrize("seed", quick(range(4), 1))
 def test_an_even_ground_has_no_shadow(seed):
     assert find_old_shadow(photo_of(None, ground_of(seed)), _matte()) is None
 

@@ -24,6 +24,7 @@ from tests import shapes
 
 DISC = shapes.mask("disc")
 HEIGHT, WIDTH = DISC.shape
+pytestmark = pytest.mark.usefixtures("without_weights")
 
 
 class Off:

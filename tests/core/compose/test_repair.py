@@ -26,6 +26,7 @@ from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
 MARGIN = hole_margin(shapes.WIDTH, shapes.HEIGHT)
+pytestmark = pytest.mark.usefixtures("without_weights")
 
 
 def _stroke(*places: tuple[float, float], radius: float = 6.0, hardness: float = 0.6) -> Stroke:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -57,10 +58,14 @@ def test_a_look_at_the_whole_photo_is_kept_in_its_document(tmp_path: Path) -> No
         set_depth(document, np.full((3, 4), np.nan, np.float32))
 
 
-def lifted(settings: LiftSettings, pixels: np.ndarray | None = None) -> LiftedObject:
-    inside = shapes.mask("ellipse", WIDTH, HEIGHT)
+def lifted(
+    settings: LiftSettings,
+    pixels: np.ndarray | None = None,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+) -> LiftedObject:
+    inside = shapes.mask("ellipse", *size)
     own = shapes.picture(inside) if pixels is None else pixels
-    return lift_mask(own, CAMERA, inside, "relief", settings)[1]
+    return lift_mask(own, shapes.camera(*size), inside, "relief", settings)[1]
 
 
 def body(name: str = "ellipse", thickness: float = 1.0) -> ReliefBody:
@@ -92,14 +97,15 @@ def same(one: LiftedObject, other: LiftedObject) -> bool:
 
 
 def test_without_a_network_or_without_its_word_everything_is_as_before(tmp_path: Path) -> None:
-    before = lifted(AS_SEEN)
-    assert same(before, lifted(ALONE))
+    as_seen, alone = (partial(lifted, told, size=(96, 72)) for told in (AS_SEEN, ALONE))
+    before = as_seen()
+    assert same(before, alone())
     install(tmp_path, brightness())
-    assert same(before, lifted(ALONE))
-    seen = lifted(AS_SEEN)
-    assert not same(before, seen) and same(seen, lifted(AS_SEEN))
+    assert same(before, alone())
+    seen = as_seen()
+    assert not same(before, seen) and same(seen, as_seen())
     models.remove("depth")
-    assert same(before, lifted(AS_SEEN))
+    assert same(before, as_seen())
 
 
 def test_what_is_bright_comes_nearer_where_brightness_is_depth(tmp_path: Path) -> None:

@@ -29,12 +29,11 @@ COUNT = 3000  # Gaussians of each mask: one lift for all that is seen of it
 masks = pytest.mark.parametrize("name", shapes.MASKS)
 
 
-def _lift(inside: np.ndarray, count: int = 800, seed: int = 0) -> LiftedObject:
+def _lift(inside: np.ndarray, count: int = 800, seed: int = 0, trust: float = 0.0) -> LiftedObject:
+    """By its silhouette alone, unless there is `trust` in the shape network."""
     height, width = inside.shape
-    camera = Camera.from_fov(width, height)
-    return lift_mask(
-        shapes.picture(inside), camera, inside, "relief", LiftSettings(count), seed=seed
-    )[1]
+    camera, settings = Camera.from_fov(width, height), LiftSettings(count, trust=trust)
+    return lift_mask(shapes.picture(inside), camera, inside, "relief", settings, seed=seed)[1]
 
 
 def _heights(scene: shapes.Scene) -> np.ndarray:
@@ -128,7 +127,7 @@ def test_the_same_seed_gives_the_same_object_and_another_seed_another():
 
 @pytest.mark.parametrize("count", quick([1000, 300, 4000], 1))
 def test_about_as_many_gaussians_as_asked(count):
-    got = (_lift(shapes.mask("disc", 640, 480), count).texture.solidity > 0.5).sum()
+    got = (_lift(shapes.mask("disc", 320, 240), count).texture.solidity > 0.5).sum()
     assert 0.6 * count <= got <= 1.4 * count
 
 
@@ -164,7 +163,7 @@ def test_parts_of_the_mask_become_parts_of_the_object():
 def test_an_object_that_fills_one_row_less_than_the_photo_lifts():
     inside = np.ones((60, 80), bool)
     inside[0] = False
-    lifted = _lift(inside, 400)
+    lifted = _lift(inside, 400, trust=1.0)
     assert np.isfinite(lifted.gaussians.means).all()
 
 
@@ -172,7 +171,7 @@ def test_an_object_that_fills_one_row_less_than_the_photo_lifts():
 def test_a_tiny_object_lifts(side):
     inside = np.zeros((120, 160), bool)
     inside[50 : 50 + side, 60 : 60 + side] = True
-    lifted = _lift(inside, 2000)
+    lifted = _lift(inside, 2000, trust=1.0)
     assert len(lifted.control_points) >= 4
     assert (lifted.gaussians.scales > 0).all()
 
@@ -234,12 +233,12 @@ def test_the_middle_sheet_changes_as_it_says(name):
 
 
 def _box() -> np.ndarray:
-    view = View(Camera.from_fov(640, 480), 15.0)
+    view = View(Camera.from_fov(320, 240), 15.0)
     return view.hull(Box(view.ahead, angle=30.0).points)
 
 
 def test_a_box_has_walls_and_a_back_of_its_own():
-    lifted = _lift(_box(), 4000)
+    lifted = _lift(_box(), 2000)
     texture, gaussians = lifted.texture, lifted.gaussians
     body = texture.solidity > 0.5
     unseen = body & (texture.visibility < 0.5)
@@ -278,7 +277,7 @@ def test_a_profile_is_mirrored_and_a_face_goes_on():
 )
 def test_the_user_says_what_the_back_is(back, splatting):
     inside = shapes.mask("ellipse")
-    settings = LiftSettings(800, back=back)
+    settings = LiftSettings(800, back=back, trust=0)
     lifted = lift_mask(shapes.picture(inside), shapes.camera(), inside, "relief", settings)[1]
     assert lifted.splatting == splatting
 
@@ -288,7 +287,7 @@ def test_what_is_hidden_belongs_to_the_shape_and_carries_no_photo():
     hidden = np.zeros_like(inside)
     hidden[:, 150:175] = True
     hidden &= inside
-    settings = LiftSettings(2000, hidden=hidden)
+    settings = LiftSettings(2000, hidden=hidden, trust=0)
     camera = shapes.camera(320, 240)
     lifted = lift_mask(shapes.picture(inside), camera, inside & ~hidden, "relief", settings)[1]
     x, y = np.floor(lifted.texture.u0).astype(int).T
@@ -309,7 +308,7 @@ def test_painted_nearness_brings_a_part_nearer():
     near[:, 20:] = 0.3
     camera = shapes.camera(320, 240)
     lifted = lift_mask(
-        shapes.picture(inside), camera, inside, "relief", LiftSettings(2000, nearness=near)
+        shapes.picture(inside), camera, inside, "relief", LiftSettings(2000, nearness=near, trust=0)
     )[1]
     assert lifted.middle is not None
     x, z = lifted.texture.u0[:, 0], lifted.middle[:, 0]

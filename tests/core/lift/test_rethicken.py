@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -70,28 +71,22 @@ def test_its_distance_from_the_middle_is_so_much_larger(name, factor):
     assert np.abs(after - factor * before).max() < 1e-5
 
 
-def _box(thickness: float) -> tuple[LiftedObject, Camera]:
-    view = View(Camera.from_fov(320, 240), 15.0)
-    mask = view.hull(Box(view.ahead, angle=30.0).points)
+@cache
+def _lifted(name: str, thickness: float) -> tuple[LiftedObject, Camera]:
+    if name == "box":
+        view = View(Camera.from_fov(320, 240), 15.0)
+        mask, camera = view.hull(Box(view.ahead, angle=30.0).points), view.camera
+    else:
+        mask, camera = shapes.mask(name), CAMERA
     settings = LiftSettings(3000, thickness, trust=0)
-    lifted = lift_mask(shapes.picture(mask), view.camera, mask, "relief", settings)[1]
-    return lifted, view.camera
+    return lift_mask(shapes.picture(mask), camera, mask, "relief", settings)[1], camera
 
 
 @pytest.mark.parametrize("name", quick(["star", "box", "disc", "ellipse"], 2))
 @factors
 def test_it_is_as_a_lift_of_that_thickness(name, factor):
     """The same surface, though other points of it."""
-    if name == "box":
-        (one, camera), (other, _) = _box(1.0), _box(factor)
-    else:
-        mask, camera = shapes.mask(name), CAMERA
-        one, other = (
-            lift_mask(
-                shapes.picture(mask), camera, mask, "relief", LiftSettings(3000, thickness, trust=0)
-            )[1]
-            for thickness in (1.0, factor)
-        )
+    (one, camera), (other, _) = _lifted(name, 1.0), _lifted(name, factor)
     changed = with_thickness(one, camera, factor)
     bodies = [_world(item)[item.texture.solidity > 0.5] for item in (changed, other)]
     spacing = max(item.spacing * item.scale for item in (changed, other, one))
@@ -104,13 +99,7 @@ def test_it_is_as_a_lift_of_that_thickness(name, factor):
 
 @factors
 def test_its_gaussians_lie_along_the_new_surface(factor):
-    mask = shapes.mask("disc")
-    one, other = (
-        lift_mask(
-            shapes.picture(mask), CAMERA, mask, "relief", LiftSettings(3000, thickness, trust=0)
-        )[1]
-        for thickness in (1.0, factor)
-    )
+    one, other = (_lifted("star", thickness)[0] for thickness in (1.0, factor))
     changed = with_thickness(one, CAMERA, factor)
     fronts = [(i.texture.visibility > 0.5) & (i.texture.solidity > 0.5) for i in (changed, other)]
     nearest = cKDTree(_world(other)[fronts[1]]).query(_world(changed)[fronts[0]])[1]

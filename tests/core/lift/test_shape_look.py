@@ -85,7 +85,7 @@ def test_it_looks_once_at_the_same_thing(net):
 
 
 def test_what_it_says_is_a_shape(net):
-    for seed in list(UNSEEN)[:4]:
+    for seed in UNSEEN[:2]:
         one = sample(seed)
         found = seen(net, one)
         assert found.front.shape == one.mask.shape

@@ -19,7 +19,7 @@ from tests.core.segment.encoded import dino, embedding
 from tests.core.segment.simulated_user import Step, around, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
-from tests.tree import over, quick
+from tests.tree import quick
 
 HELPS = 0.01  # IoU that a click in the middle of the largest error may cost
 SPOILS = 0.005  # IoU: rounding at the edges near the click; the coin loses 0.0038
@@ -55,7 +55,7 @@ sure: dict[str, list[float | None]] = {}  # of those steps: told while the photo
 # The truth ------------------------------------------------------------------------------------
 
 
-@over("name", [each.name for each in (*TRUTHS, *LATER)])
+@pytest.mark.parametrize("name", quick([each.name for each in (*TRUTHS, *LATER)], 4))
 def test_a_reference_mask_is_what_its_outline_draws(name):
     np.testing.assert_array_equal(truth_mask(name), draw_mask(name))
     assert truth_mask(name).shape == photo(truth(name).photo).shape[:2]
@@ -142,7 +142,8 @@ def test_wherever_a_later_click_is_nothing_changes_that_hangs_not_together_with_
         assert min(changes) < 0.1
 
 
-@pytest.mark.parametrize("name", quick(["coin", "cameraman", "pagoda"], 1))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["coin", "cameraman", "pagoda"])
 def test_a_click_on_a_narrow_error_spoils_nothing_beside_it(name):
     """The error is narrower than the photo's pieces, and what is right lies in the same ones."""
     ious = [step.iou for step in steps(name)]
@@ -177,6 +178,7 @@ def test_another_object_is_not_the_one_that_is_there_already():
     np.testing.assert_array_equal(again, found)
 
 
+@pytest.mark.slow
 def test_a_thing_that_is_held_stays_whole_when_who_holds_it_is_taken_away():
     first, second = steps("tripod")[:2]
     assert overlap(first.mask, truth_mask("cameraman")) > 0.7

@@ -19,6 +19,7 @@ from objectmorpher_core.segment.matting.repair import (
     unbrush_edge,
 )
 from tests.core.segment.composites import HEIGHT, WIDTH, composite, picture
+from tests.tree import quick
 
 BOX = (0, 0, WIDTH, HEIGHT)
 OFF = 4  # px by which a mask's edge is wrong
@@ -56,7 +57,7 @@ def _error(matte: Matte, name: str, where: Mask) -> float:
     return 255 * float(np.abs(shown - true).mean(2)[where].mean())
 
 
-@pytest.mark.parametrize("name", ["red squirrel", "bird"])  # nothing was tuned on them
+@pytest.mark.parametrize("name", quick(["bird", "red squirrel"], 1))  # nothing was tuned on them
 def test_the_edge_brush_finds_what_a_wrong_mask_missed(name: str) -> None:
     """Of the squirrel's error a fifth and a fourth are left; of the bird, whose legs are gone when
     its mask is too small, 0.62."""
@@ -74,7 +75,7 @@ def test_the_edge_brush_finds_what_a_wrong_mask_missed(name: str) -> None:
 
 
 def test_the_brush_changes_nothing_elsewhere_and_can_be_undone() -> None:
-    pixels, mask = picture("red squirrel")
+    pixels, mask = picture("bird")
     left = _rim(mask, 10)
     left[:, WIDTH // 2 :] = False
     coverage, mixed = brush_edge(EdgeStroke(pixels, mask, None, left))
@@ -127,7 +128,7 @@ def _nearest(rgb: np.ndarray, where: Mask) -> np.ndarray:
     return cv2.GaussianBlur(table[labels], (0, 0), 2)
 
 
-@pytest.mark.parametrize("name", ["bird", "orange"])  # nothing was tuned on them
+@pytest.mark.parametrize("name", quick(["bird", "orange"], 1))  # nothing was tuned on them
 def test_decontamination_takes_the_background_out_of_a_halo(name: str) -> None:
     """A third of it and less is left: 0.07 of 0.21, and 0.06 of 0.17."""
     pixels, mask = picture(name)

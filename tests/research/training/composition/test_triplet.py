@@ -27,6 +27,8 @@ from objectmorpher_research.training.composition.triplet import (
 from tests import shapes
 from tests.tree import over
 
+pytestmark = pytest.mark.usefixtures("lifted_once")
+
 HOW = TripletPlan(lifter="relief", inpainter="telea", gaussians=3000)
 WORKER = """
 import json, sys
