@@ -49,6 +49,9 @@ FIRST = (  # what is imported and compiled late comes before the limits
 )  # fmt: skip
 
 
+COMPILING = "compiling for this processor, once"  # the first edit after an installation says so
+
+
 def verdict(words: list[str]) -> tuple[str, str]:
     """Whether a run gave a picture ("done"), one sentence ("refused"), or neither, and why."""
     for name in OUTPUTS:
@@ -64,6 +67,7 @@ def verdict(words: list[str]) -> tuple[str, str]:
             return "found", f"{type(error).__name__}: {error}"
     try:
         said = Path(told).read_text(encoding="utf-8", errors="replace")
+        said = "".join(line for line in said.splitlines(True) if COMPILING not in line)
         if code in (0, None):
             notes = said.splitlines()  # a shadow that goes along is named, a doubtful front too
             is_plain = all(n.startswith("objectmorpher: ") and UNFORESEEN not in n for n in notes)

@@ -75,7 +75,11 @@ class ReliefLifter:
     def lift(
         self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int = 0
     ) -> LiftedObject:
-        """See `Lifter`. Raises LiftError for an object of fewer than about 25 pixels."""
+        """See `Lifter`.
+
+        Raises LiftError for an object of fewer than about 25 pixels, and for one that has no depth
+        in so wide a view.
+        """
         mask, camera, matte = subject.mask, subject.camera, subject.matte
         area = int(np.count_nonzero(mask))
         if area < LEAST_AREA:
@@ -86,6 +90,8 @@ class ReliefLifter:
         axis = _axis(canvas, settings)
         body = self._body(subject, settings, axis, progress)
         outline = body.silhouette
+        if not np.isfinite(body.middle[outline.inside]).all():
+            raise LiftError("the field of view is too wide for the object to have a depth")
         progress(0.3, "Placing Gaussians")
         rng = np.random.default_rng(seed)
         band = max(band_width(camera.width, camera.height), _softness(mask, matte, outline.extent))
