@@ -264,7 +264,8 @@ def continue_script(
             step = part(progress, 0.6, 0.85)
             behind = with_plate(document, script, frozenset(run.casting), step)
             document, notes = behind.document, (*notes, *behind.notes)
-    if not script.no_depth and any(item.shadow.strength > 0 for item in document.objects):
+    has_shadow = any(item.shadow.strength > 0 for item in document.objects)
+    if has_shadow and document.depth is None and not script.no_depth:
         document = edits.set_depth(document, look_at_all(document.photo.pixels))
     for k, wanted in enumerate(wishes):
         if wanted.script.refine == "harmonise":

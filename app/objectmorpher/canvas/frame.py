@@ -215,10 +215,8 @@ def _blend(
     `shaded`: what rests, where shadows fall on it.
     """
     looks = [look for _, look in moved] + shaded
-    key = (
-        *view.place,
-        *((id(look.shade), id(look.relit) * look.is_shaded, look.blur) for look in looks),
-    )
+    shades = ((look.shade, look.relit if look.is_shaded else None) for look in looks)
+    key = (*view.place, *(id(part) for pair in shades for part in pair), *(x.blur for x in looks))
     if cache.blended is None or cache.blended[0] is not document or cache.blended[1] != key:
         touched = cache.lights.touched(plate, looks, view, CELL)
         cache.blended = (document, key, build_blend(document, moved, view, touched))

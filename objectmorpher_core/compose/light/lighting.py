@@ -200,7 +200,7 @@ class Lighting:
         standing = stand(splats, camera, horizon, item.shadow, most)
         if standing is None:
             return None
-        return Caster(item.shadow, standing, camera, horizon, cells, self._depth)
+        return Caster(item.shadow, standing, horizon, cells, self._depth)
 
     def _gain(self, item: EditObject, splats: PosedSplats, rest: Callable[[], PosedSplats]) -> Gain:
         """The factors of an object's colours in the light of where it is now."""

@@ -135,9 +135,9 @@ def relight(
     asked = EVERY if few is None else few
     means, normals = splats.means[asked], turned_normals(splats, asked)
     factors = _factors(splats.rest.shown_normals[asked], normals, strength * light)
+    body = splats.means[sketched(splats, SHADED)] if casters else means
     for caster in casters:
         ink = float(np.mean(caster.shadow.colour))
-        body = splats.means[sketched(splats, SHADED)]
         factors *= 1 - (1 - ink) * caster.on(means, normals, body)
     if np.abs(factors - 1).max() < NOTHING:
         return None

@@ -18,7 +18,6 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ...base.arrays import F32, F64, Mask
-from ...base.camera import Camera
 from ...document.settings import Shadow
 from ..silhouette import SilhouetteGrid, box_around
 from .shadow import BAND, FINE, SPRAY, FlatShadow, Shade, StandingObject, opacity, trimmed
@@ -42,7 +41,6 @@ class Caster:
 
     shadow: Shadow
     standing: StandingObject
-    camera: Camera
     horizon: float | None = None  # px, where it is known
     cells: int = FINE
     seen: F32 | None = None  # (h, w) the photo's inverse depth, see `Document.depth`
@@ -63,7 +61,7 @@ class Caster:
         grid = SilhouetteGrid(left, top, pitch, width, height)
         x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
         xy = np.column_stack([left + pitch * x.ravel(), top + pitch * y.ravel()])
-        rays = self.camera.unproject(xy, np.ones(len(xy)))
+        rays = self.standing.camera.unproject(xy, np.ones(len(xy)))
         inverse = np.maximum((self._seen_at(xy) - scale[1]) / scale[0], 1e-9)
         places, is_plain = self._met(rays, 1 / inverse)
         if is_plain.all():
@@ -76,13 +74,13 @@ class Caster:
     def _seen_at(self, xy: np.ndarray) -> F64:
         """(N,) what the depth map says at photo px (N, 2)."""
         assert self.seen is not None
-        size = np.array([self.camera.width, self.camera.height])
+        size = np.array([self.standing.camera.width, self.standing.camera.height])
         x, y = (xy * self.seen.shape[::-1] / size - 0.5).T
         return map_coordinates(self.seen, [y, x], np.float64, order=1, mode="nearest")
 
     def _scale(self) -> tuple[float, float] | None:
         """Factor and shift of the inverse depth, by the ground before the foot; None: not told."""
-        standing, camera = self.standing, self.camera
+        standing, camera = self.standing, self.standing.camera
         foot, size = standing.foot, standing.height
         across = size * np.linspace(-1, 1, LOOKED)
         nearer = size * np.linspace(AT_FOOT, 1, LOOKED)
@@ -119,7 +117,7 @@ class Caster:
 
     def reaches(self, points: F64) -> bool:
         """Whether its shadow may be seen on an object of these points (N, 3)."""
-        own, other = self._box, box_around(points, self.camera, 0.0)
+        own, other = self._box, box_around(points, self.standing.camera, 0.0)
         if own is None or other is None:
             return False
         return all(own[0][a] < other[1][a] and other[0][a] < own[1][a] for a in (0, 1))
@@ -142,11 +140,11 @@ class Caster:
     def _box(self) -> tuple[tuple[float, float], tuple[float, float]] | None:
         """Around most of what lies between the object and where its shadow falls, photo px."""
         few = self.standing.lit(self.shadow)[::EIGHTH]
-        return box_around(few, self.camera, ROOM * self.standing.height)
+        return box_around(few, self.standing.camera, ROOM * self.standing.height)
 
     def _beside(self, points: F64) -> float | None:
         """X its distance, how far away another object is; None where it has no ground with this."""
-        standing, camera = self.standing, self.camera
+        standing, camera = self.standing, self.standing.camera
         foot, seen = standing.foot, points[points[:, 2] > 0]
         if foot[2] <= 0 or not len(seen):
             return None
@@ -182,7 +180,8 @@ class Caster:
         assert self._flat is not None
         grid, heights = self._flat.grid, self._heights
         there = np.flatnonzero(met[:, 2] > 0)
-        x, y = ((self.camera.project(met[there]) - (grid.left, grid.top)) / grid.pitch - 0.5).T
+        xy = self.standing.camera.project(met[there])
+        x, y = ((xy - (grid.left, grid.top)) / grid.pitch - 0.5).T
         level = np.interp(
             high[there] / self.standing.height, heights, np.arange(len(heights), dtype=np.float64)
         )

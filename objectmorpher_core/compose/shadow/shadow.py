@@ -3,8 +3,8 @@
 The ground is a plane under the object's lowest Gaussians. What is h above it throws its shadow
 h x length x (cos, sin) of the direction from its foot, on the ground: the object's own depth is in
 it, so a thing that turns throws another shadow. The farther from the ground, the more blurred and
-the weaker. Right below what stands on it lies a dark band, the contact. What the light meets before
-the ground, `fall` knows.
+the weaker. Right below what stands on it lies a dark band, the contact. `fall` knows what the light
+meets before the ground.
 
 How steeply one looks down on the ground follows from the photo's horizon, where that is known;
 else the artist says it. Nothing is known of the light: the artist says that, too, or the shadow
@@ -83,17 +83,6 @@ def ground_normal(camera: Camera, horizon: float | None, shadow: Shadow, row: fl
     return np.array([0.0, np.cos(tilt), np.sin(tilt)])
 
 
-def cast(
-    shadow: Shadow, standing: StandingObject, cells: int = FINE, horizon: float | None = None
-) -> Shade | None:
-    """The shadow of an object, of at most so many `cells`; None where there is none.
-
-    Where the row of the photo is known that the `horizon` lies in, px, it ends there.
-    """
-    lying = FlatShadow.of(shadow, standing, cells)
-    return None if lying is None else lying.shade(shadow, standing, horizon)
-
-
 @dataclass(frozen=True, eq=False)
 class FlatShadow:
     """A shadow on plain ground."""
@@ -113,7 +102,7 @@ class FlatShadow:
     def shade(
         self, shadow: Shadow, standing: StandingObject, horizon: float | None
     ) -> Shade | None:
-        """As a picture that ends at the `horizon`, see `cast`."""
+        """As a picture; it ends at the photo's `horizon`, px of its row, where that is known."""
         grid, alpha = self.grid, self.alpha
         if horizon is not None:
             if standing.is_above(horizon):  # it is in the air
@@ -149,7 +138,7 @@ class StandingObject:
         self._is_low = self._above <= BAND * self.height
         self._right = np.array([1.0, 0.0, 0.0])
         self._nearer = np.cross(normal, self._right)  # on the ground, towards the viewer
-        self._camera = camera
+        self.camera = camera
         size = self.height * camera.focal / max(float(middle[2]), 1e-9)
         self._size = min(size, float(FARTHEST * np.hypot(camera.width, camera.height)))  # photo px
         # Lengths on the ground, towards the viewer, look so much shorter.
@@ -158,12 +147,12 @@ class StandingObject:
     def is_above(self, horizon: float) -> bool:
         """Whether its foot is seen above a row of the photo, px."""
         foot = self.foot
-        return bool(foot[2] > 0 and self._camera.project(foot)[1] <= horizon)
+        return bool(foot[2] > 0 and self.camera.project(foot)[1] <= horizon)
 
     def grid(self, shadow: Shadow, cells: int = FINE) -> SilhouetteGrid | None:
         """About the whole shadow, at most so many `cells` long; None where none is seen."""
         points = np.concatenate([self._fallen(shadow), self._feet[self._is_low]])
-        box = box_around(points, self._camera, 0.0)
+        box = box_around(points, self.camera, 0.0)
         if box is None:
             return None
         (left, top), (right, bottom) = box
@@ -182,7 +171,7 @@ class StandingObject:
         """
         is_higher = self._above >= level
         high = (self._above[is_higher] - level) / self.height
-        cover, share = _spread(self._fallen(shadow)[is_higher], high, grid, self._camera)
+        cover, share = _spread(self._fallen(shadow)[is_higher], high, grid, self.camera)
         share, size = np.clip(share, 0, 1), self._size / grid.pitch
         mixed = np.zeros_like(cover)
         for k, blur in enumerate(BLURS):
@@ -195,7 +184,7 @@ class StandingObject:
     def contact(self, grid: SilhouetteGrid) -> F32:
         """(h, w) what touches the ground, blurred and a little lower, 1 at its darkest."""
         low = 1 - self._above[self._is_low] / (BAND * self.height)
-        cover, share = _spread(self._feet[self._is_low], low, grid, self._camera)
+        cover, share = _spread(self._feet[self._is_low], low, grid, self.camera)
         size = self._size / grid.pitch
         near = self._smooth(cover * share, BAND_BLUR * size)
         drop = round(BAND_DROP * size)

@@ -10,9 +10,10 @@ import pytest
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import stand
+from objectmorpher_core.compose.shadow.fall import Caster
 from objectmorpher_core.compose.shadow.shadow import (
+    Shade,
     StandingObject,
-    cast,
     ground_normal,
     opacity,
 )
@@ -38,6 +39,10 @@ def _block() -> StandingObject:
     mask = np.zeros((200, 260), bool)
     mask[54:114, 104:144] = True
     return standing(mask, CAMERA)
+
+
+def cast(shadow: Shadow, standing: StandingObject) -> Shade | None:
+    return Caster(shadow, standing).shade
 
 
 def _moved(name: str = "ellipse", placement: Placement = MOVE) -> Document:

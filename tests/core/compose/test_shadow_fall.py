@@ -10,7 +10,7 @@ import pytest
 from objectmorpher_core.base.arrays import F32, F64, Mask
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.shadow.fall import Caster
-from objectmorpher_core.compose.shadow.shadow import StandingObject, cast, ground_normal
+from objectmorpher_core.compose.shadow.shadow import StandingObject, ground_normal
 from objectmorpher_core.document.settings import Shadow
 from tests.outlines import upright
 
@@ -81,7 +81,7 @@ def wall(distance: float) -> F64:
 def shade(depth: F64, shadow: Shadow = SHARP) -> F32:
     """(H, W) the shadow where the photo is so deep, told as a network does."""
     seen = (3.0 / depth + 0.2).astype(np.float32)
-    found = Caster(shadow, BOARD.standing, CAMERA, cells=176, seen=seen).shade
+    found = Caster(shadow, BOARD.standing, cells=176, seen=seen).shade
     return np.zeros(depth.shape, np.float32) if found is None else found.at(BOX)
 
 
@@ -103,7 +103,7 @@ def test_it_falls_where_rays_say(name: str) -> None:
     truth = BOARD.hides(depth[..., None] * rays(), SHARP)
     seen = shade(depth)
     found = seen > 0.4 * seen.max()
-    plain = cast(SHARP, BOARD.standing)
+    plain = Caster(SHARP, BOARD.standing).shade
     assert plain is not None
     before = plain.at(BOX) > 0.4 * plain.alpha.max()
     assert overlap(found, truth) > 0.75
@@ -124,11 +124,11 @@ def test_on_a_wall_it_stands_upright() -> None:
 
 
 def test_plain_ground_changes_nothing() -> None:
-    plain = cast(SHARP, BOARD.standing)
+    plain = Caster(SHARP, BOARD.standing).shade
     noisy = ground() * (1 + 0.003 * np.sin(np.mgrid[:200, :260][1] / 9))
     for depth in (ground(), noisy):
         seen = (3 / depth + 0.2).astype(np.float32)
-        found = Caster(SHARP, BOARD.standing, CAMERA, seen=seen).shade
+        found = Caster(SHARP, BOARD.standing, seen=seen).shade
         assert plain is not None and found is not None
         np.testing.assert_array_equal(found.alpha, plain.alpha)
 
@@ -139,16 +139,16 @@ def test_none_falls_on_the_sky_or_beyond_an_edge() -> None:
     assert shade(edge).max() > 0.4
     horizon = 100.0  # px: the board's foot is below it, its shadow is told to go above
     long = replace(SHARP, direction=-90.0, length=4.0, softness=1.0)
-    told = Caster(long, BOARD.standing, CAMERA, horizon).shade
+    told = Caster(long, BOARD.standing, horizon).shade
     assert told is not None and not told.at(BOX)[:100].any()
-    assert cast(long, BOARD.standing, horizon=160.0) is None  # a thing in the air
+    assert Caster(long, BOARD.standing, 160.0).shade is None  # a thing in the air
 
 
 def test_another_object_is_hit_where_rays_say() -> None:
     """A board behind the board; lifted at the same distance, as every lift is."""
     other = BOARD.points + 0.6 * BOARD.height * (BOARD.axes[0] - BOARD.axes[2])
     normals = np.broadcast_to(BOARD.axes[2], other.shape)
-    caster = Caster(SHARP, BOARD.standing, CAMERA)
+    caster = Caster(SHARP, BOARD.standing)
     truth = BOARD.hides(other[None], SHARP)[0]
     for times in (1.0, 0.8):
         found = caster.on(times * other, normals, times * other)
