@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from objectmorpher_core.lift.relief import shape_look
 from tests.fuzz import options
 from tests.fuzz.command_lines import options_of, values
 from tests.fuzz.shapes_of_photos import make_files
@@ -16,9 +17,11 @@ pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="the limits on a process are Linux's"
 )
 
+# What the shape network sees has no depth in so wide a view; the outline alone has one.
+WIDE = "done" if shape_look.missing() else "refused"
 ONCE = {  # that ended otherwise; how each ends now
     "edit p/plain.png -o o.png --mask p/plain-mask.png --scale=1e9": "done",
-    "edit p/plain.png -o o.png --mask p/plain-mask.png --move=5,5 --fov=170": "refused",
+    "edit p/plain.png -o o.png --mask p/plain-mask.png --move=5,5 --fov=170": WIDE,
     "edit p/tall.png -o o.png --mask p/tall-mask.png --move=5,5 --gaussians=200": "done",
     "edit p/tall.png -o o.png --mask p/tall-mask-most.png --move=5,5": "done",
     "edit p/plain.png -o o.png --mask p/plain-mask-line.png --move=5,5": "done",
