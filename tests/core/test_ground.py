@@ -8,13 +8,21 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.rotations import turn_matrix, turn_of
+from objectmorpher_core.base.rotations import (
+    CAMERA_GIMBAL,
+    turn_about,
+    turn_matrix,
+    turn_of,
+    vector_from_matrix,
+)
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.document.placement import (
     GroundError,
     HeldPoint,
     centre_of,
+    gimbal_of,
     ground_under,
+    spun,
     turned,
     with_centre,
 )
@@ -182,3 +190,40 @@ def test_a_roll_keeps_the_middle_of_the_outline(scene):
     about_centre = middle(replace(start, turn=rolled)) - middle(start)
     assert np.linalg.norm(about_centre) > 0.5
     assert np.linalg.norm(middle(kept) - middle(start)) < 0.1 * np.linalg.norm(about_centre)
+
+
+UPS = [(0.0, -1.0, 0.0), (0.1, -0.6, -float(np.sqrt(1 - 0.37)))]
+
+
+@over("up", UPS)
+@over("degrees", [25.0, -35.0, 170.0])
+@over("turn", [(0.0, 0.0, 0.0), (12.0, -8.0, 30.0)])
+def test_a_spin_turns_what_stands_on_its_foot_about_its_upright(scene, up, degrees, turn):
+    document = scene.document()
+    lifted = replace(scene.lifted, up=up, stands=True)
+    thing = replace(document.objects[0], lifted=lifted)
+    start = Placement((4.0, -3.0), 0.2, turn, 1.2)
+    before = start.matrix(lifted, scene.camera)
+    after = spun(start, degrees, thing, document).matrix(lifted, scene.camera)
+    points, down = _points(scene), -np.array(up)
+    depth = points @ down
+    own = points[depth > depth.max() - 0.04 * np.ptp(depth)]
+    foot = 0.5 * (own.min(0) + own.max(0))
+    np.testing.assert_allclose(*([*m[:3] @ [*foot, 1.0]] for m in (before, after)), atol=EXACT)
+    np.testing.assert_allclose(after[:3, :3] @ down, before[:3, :3] @ down, atol=EXACT)
+    spin = np.linalg.inv(before[:3, :3]) @ after[:3, :3]
+    assert np.degrees(turn_about(vector_from_matrix(spin), down)) == pytest.approx(degrees)
+
+
+def test_the_horizon_says_what_is_upright_where_a_shape_does_not(scene):
+    thing = scene.document().objects[0]
+    assert gimbal_of(thing, scene.camera) is CAMERA_GIMBAL
+    known = gimbal_of(thing, scene.camera, 20.0)
+    ground = ground_under(_points(scene), scene.camera, 20.0)
+    np.testing.assert_allclose(known.down, ground.normal)
+    thing = replace(thing, lifted=replace(scene.lifted, up=UPS[1]))
+    own = gimbal_of(thing, scene.camera, 20.0)
+    np.testing.assert_allclose(own.down, -np.array(UPS[1]))
+    told = gimbal_of(replace(thing, seen_from=30.0), scene.camera, 20.0).down
+    way = scene.lifted.centre / np.linalg.norm(scene.lifted.centre)
+    assert np.degrees(np.arcsin(told @ way)) == pytest.approx(30.0, abs=1.0)

@@ -195,16 +195,16 @@ def _along(part: str) -> Callable[[Editor, Pointer], Change]:
         shown, start = gizmo(editor), editor.placing.placement
         assert shown is not None and start is not None
         ring = shown.rings[part]
-        went = _went(ring, first.xy)
+        went, before = _went(ring, first.xy), editor.placing.angles
 
         def change(now: Pointer, away: float) -> Placement:
-            turn = list(start.turn)
+            turn = list(before)
             turn[axis] += float(np.degrees(went(now.xy)))
             if now.shift:
                 turn[axis] = round(turn[axis] / SNAP) * SNAP
             turn[axis] = wrapped(turn[axis])
             farther = replace(start, depth=start.depth + away)
-            return editor.placing.turned(farther, (turn[0], turn[1], turn[2]))
+            return editor.placing.turned_to(farther, (turn[0], turn[1], turn[2]))
 
         return change
 
@@ -282,14 +282,13 @@ def _ball(editor: Editor, first: Pointer) -> Change:
 
 def _turn(editor: Editor, first: Pointer) -> Change:
     """What faces the camera follows the pointer: to the right is a negative yaw (DESIGN 6)."""
-    start = editor.placing.placement
+    start, (yaw, pitch, roll) = editor.placing.placement, editor.placing.angles
     assert start is not None
 
     def change(now: Pointer, away: float) -> Placement:
         delta = one_axis((now.xy - first.xy) / editor.view.scale * TURN_SPEED, now)
-        yaw, pitch, roll = start.turn
         turn = (wrapped(yaw - delta[0]), wrapped(pitch + delta[1]), roll)
-        return editor.placing.turned(replace(start, depth=start.depth + away), turn)
+        return editor.placing.turned_to(replace(start, depth=start.depth + away), turn)
 
     return change
 

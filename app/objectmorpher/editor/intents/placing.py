@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.model import EditObject, Placement
 from objectmorpher_core.document.placement import (
     Ground,
-    GroundError,
     HeldPoint,
     centre_of,
-    ground_under,
+    gimbal_of,
     turned,
     with_centre,
 )
@@ -46,6 +46,48 @@ class Placing:
         if editor.document is None or not editor.is_lifted:
             return None
         return editor.derived.frame(editor.document, editor.current)
+
+    @property
+    def gimbal(self) -> Gimbal:
+        """The axes about which the current object turns; the camera's where nothing is lifted."""
+        document, thing = self._editor.document, self._editor.object
+        if document is None or thing is None:
+            return CAMERA_GIMBAL
+        return gimbal_of(thing, document.photo.camera, document.horizon)
+
+    @property
+    def seen_from(self) -> float:
+        """From how many degrees above one looks down on the current object, at rest."""
+        return self._looking_down(self._editor.object)
+
+    @property
+    def usual_seen_from(self) -> float:
+        """The same, as it is seen to stand."""
+        thing = self._editor.object
+        return self._looking_down(thing and replace(thing, seen_from=None))
+
+    def _looking_down(self, thing: EditObject | None) -> float:
+        document = self._editor.document
+        assert document is not None and thing is not None and thing.lifted is not None
+        down = gimbal_of(thing, document.photo.camera, document.horizon).down
+        way = thing.lifted.centre / np.linalg.norm(thing.lifted.centre)
+        return float(np.degrees(np.arcsin(np.clip(way @ down, 0.0, 1.0))))
+
+    def look_down(self, degrees: float | None) -> None:
+        """Previews the current object as seen from so many degrees above; None: as it stands."""
+        editor = self._editor
+        if editor.committed is not None and editor.is_lifted:
+            editor.preview = edits.set_seen_from(editor.committed, editor.current, degrees)
+
+    @property
+    def angles(self) -> tuple[float, float, float]:
+        """Yaw, pitch and roll of the current object, degrees, about its own axes."""
+        placement = self.placement
+        return (0.0, 0.0, 0.0) if placement is None else self.gimbal.of(placement.turn)
+
+    def turned_to(self, start: Placement, angles: tuple[float, float, float]) -> Placement:
+        """`start` with other angles about the object's own axes, degrees."""
+        return self.turned(start, self.gimbal.turn(angles))
 
     def centre(self) -> np.ndarray:
         """(3,) world: what the object turns about."""
@@ -147,11 +189,7 @@ class Placing:
         own = self._editor.derived.body_points(document, self._editor.current)
         points = lifted.world_points(own)
         try:
-            down = ground_under(points, camera, self.horizon).normal
-        except GroundError:
-            down = np.array([0.0, 1.0, 0.0])
-        try:
-            changed = turned(start, turn, points, lifted, camera, down)
+            changed = turned(start, turn, points, lifted, camera, self.gimbal.down)
         except ValueError:  # behind the camera, as `move_to` will say
             changed = replace(start, turn=turn)
         return self.stood(changed)
