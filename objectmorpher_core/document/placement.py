@@ -81,11 +81,21 @@ def down_at(
     return None
 
 
-def gimbal_of(item: EditObject, camera: Camera, horizon: float | None = None) -> Gimbal:
-    """The axes about which an object is turned: about what is upright there, else the camera's."""
+def gimbal_of(item: EditObject, document: Document) -> Gimbal:
+    """The axes about which an object is turned: about what is upright there, else the camera's.
+
+    What says nothing itself stands as another object of the photo does, else on the ground.
+    """
     if item.lifted is None:
         return CAMERA_GIMBAL
-    down = down_at(item.lifted, camera, horizon, item.seen_from)
+    camera = document.photo.camera
+    others = document.objects if item.lifted.origin is None else ()
+    for own in (item, *others):
+        if own.lifted is not None and (own is item or own.lifted.origin is None):
+            down = down_at(own.lifted, camera, None, own.seen_from)
+            if down is not None:
+                return Gimbal.about(down)
+    down = down_at(item.lifted, camera, document.horizon)
     return CAMERA_GIMBAL if down is None else Gimbal.about(down)
 
 
@@ -134,7 +144,7 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
     """
     assert item.lifted is not None, "only a lifted object can be turned"
     lifted, camera = item.lifted, document.photo.camera
-    gimbal = gimbal_of(item, camera, document.horizon)
+    gimbal = gimbal_of(item, document)
     matrix = turn_matrix(*placement.turn) @ gimbal.matrix(degrees, 0.0, 0.0)
     points = lifted.world_points(lifted.body.means)
     return turned(placement, turn_of(matrix), points, lifted, camera, gimbal.down)

@@ -285,7 +285,7 @@ class _Film:
         return self._document.with_object(k, replace(item, placement=placement, is_visible=True))
 
     def _gimbal(self, item: EditObject) -> Gimbal:
-        return gimbal_of(item, self._document.photo.camera, self._document.horizon)
+        return gimbal_of(item, self._document)
 
     def _between(self, k: int, start: EditObject, end: EditObject, share: float) -> EditObject:
         """Object `k` when a `share` of the way from one of its states to another is done."""

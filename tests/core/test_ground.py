@@ -215,15 +215,17 @@ def test_a_spin_turns_what_stands_on_its_foot_about_its_upright(scene, up, degre
     assert np.degrees(turn_about(vector_from_matrix(spin), down)) == pytest.approx(degrees)
 
 
-def test_the_horizon_says_what_is_upright_where_a_shape_does_not(scene):
-    thing = scene.document().objects[0]
-    assert gimbal_of(thing, scene.camera) is CAMERA_GIMBAL
-    known = gimbal_of(thing, scene.camera, 20.0)
+def test_a_thing_stands_as_told_as_its_shape_says_as_its_neighbour_does_or_by_the_horizon(scene):
+    document = scene.document()
+    thing = document.objects[0]
+    assert gimbal_of(thing, document) is CAMERA_GIMBAL
+    document = replace(document, horizon=20.0)
     ground = ground_under(_points(scene), scene.camera, 20.0)
-    np.testing.assert_allclose(known.down, ground.normal)
-    thing = replace(thing, lifted=replace(scene.lifted, up=UPS[1]))
-    own = gimbal_of(thing, scene.camera, 20.0)
-    np.testing.assert_allclose(own.down, -np.array(UPS[1]))
-    told = gimbal_of(replace(thing, seen_from=30.0), scene.camera, 20.0).down
+    np.testing.assert_allclose(gimbal_of(thing, document).down, ground.normal)
+    plate = replace(thing, lifted=replace(scene.lifted, up=UPS[1]))
+    document = replace(document, objects=(thing, plate))
+    for own in (thing, plate):
+        np.testing.assert_allclose(gimbal_of(own, document).down, -np.array(UPS[1]))
+    told = gimbal_of(replace(plate, seen_from=30.0), document).down
     way = scene.lifted.centre / np.linalg.norm(scene.lifted.centre)
     assert np.degrees(np.arcsin(told @ way)) == pytest.approx(30.0, abs=1.0)

@@ -148,7 +148,7 @@ def _places(document: Document, index: int, puppet: Puppet, scale: float) -> dic
     assert matte is not None
     now = item.placement.matrix(lifted, camera) @ lifted.world_from_object
     rest = lifted.world_from_object
-    down = gimbal_of(item, camera, document.horizon).down
+    down = gimbal_of(item, document).down
     left, top, right, bottom = (side * scale for side in matte.box)
     return {
         "camera": [camera.focal * scale, camera.cx * scale, camera.cy * scale],

@@ -53,7 +53,7 @@ class Placing:
         document, thing = self._editor.document, self._editor.object
         if document is None or thing is None:
             return CAMERA_GIMBAL
-        return gimbal_of(thing, document.photo.camera, document.horizon)
+        return gimbal_of(thing, document)
 
     @property
     def seen_from(self) -> float:
@@ -69,7 +69,7 @@ class Placing:
     def _looking_down(self, thing: EditObject | None) -> float:
         document = self._editor.document
         assert document is not None and thing is not None and thing.lifted is not None
-        down = gimbal_of(thing, document.photo.camera, document.horizon).down
+        down = gimbal_of(thing, document).down
         way = thing.lifted.centre / np.linalg.norm(thing.lifted.centre)
         return float(np.degrees(np.arcsin(np.clip(way @ down, 0.0, 1.0))))
 
