@@ -128,11 +128,47 @@ def turned(
         step = seen[0].mean(0) - seen[1].mean(0)
         move = placement.move[0] + float(step[0]), placement.move[1] + float(step[1])
         return replace(changed, move=move)
+    return _on_its_foot(placement, changed, points, lifted, camera, down)
+
+
+def scaled(
+    placement: Placement,
+    scale: float,
+    points: np.ndarray,
+    lifted: LiftedObject,
+    camera: Camera,
+    down: np.ndarray,
+) -> Placement:
+    """`placement` with another `scale`, about the foot of what stands, else about the centre.
+
+    The rest is as for `turned`.
+    """
+    changed = replace(placement, scale=scale)
+    return _on_its_foot(placement, changed, points, lifted, camera, down)
+
+
+def foot_of(
+    placement: Placement, points: np.ndarray, lifted: LiftedObject, camera: Camera, down: np.ndarray
+) -> F64:
+    """(3,) world: what stays where it is while an object turns or grows. `turned` has the rest."""
+    motion = placement.matrix(lifted, camera)
+    stays = _foot(points, down) if lifted.stands else lifted.centre
+    return motion[:3, :3] @ stays + motion[:3, 3]
+
+
+def _on_its_foot(
+    before: Placement,
+    changed: Placement,
+    points: np.ndarray,
+    lifted: LiftedObject,
+    camera: Camera,
+    down: np.ndarray,
+) -> Placement:
+    """`changed`, moved so that the foot of what stands is where it was `before`."""
     if not lifted.stands:
         return changed
-    foot = _foot(points, down)
-    stays = before[:3, :3] @ foot + before[:3, 3]
-    offset = after[:3, :3] @ (foot - lifted.centre)
+    stays = foot_of(before, points, lifted, camera, down)
+    offset = changed.matrix(lifted, camera)[:3, :3] @ (_foot(points, down) - lifted.centre)
     return with_centre(changed, stays - offset, lifted, camera)
 
 

@@ -20,8 +20,10 @@ from objectmorpher_core.document.placement import (
     GroundError,
     HeldPoint,
     centre_of,
+    foot_of,
     gimbal_of,
     ground_under,
+    scaled,
     spun,
     turned,
     with_centre,
@@ -229,3 +231,18 @@ def test_a_thing_stands_as_told_as_its_shape_says_as_its_neighbour_does_or_by_th
     told = gimbal_of(replace(plate, seen_from=30.0), document).down
     way = scene.lifted.centre / np.linalg.norm(scene.lifted.centre)
     assert np.degrees(np.arcsin(told @ way)) == pytest.approx(30.0, abs=1.0)
+
+
+@over("stands", [True, False])
+@over("up", UPS)
+def test_what_stands_grows_from_its_foot_and_all_else_from_its_centre(scene, up, stands):
+    lifted, points = replace(scene.lifted, up=up, stands=stands), _points(scene)
+    start = Placement((4.0, -3.0), 0.2, (12.0, -8.0, 30.0), 1.2)
+    standing = (points, lifted, scene.camera, -np.array(up))
+    larger = scaled(start, 1.9, *standing)
+    assert (larger.turn, larger.scale) == (start.turn, 1.9)
+    feet = [foot_of(own, *standing) for own in (start, larger)]
+    np.testing.assert_allclose(*feet, atol=EXACT)
+    if not stands:
+        np.testing.assert_allclose(feet[0], centre_of(start, lifted, scene.camera), atol=EXACT)
+        assert larger == replace(start, scale=1.9)

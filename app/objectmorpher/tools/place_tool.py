@@ -172,17 +172,18 @@ def _depth(editor: Editor, first: Pointer) -> Change:
 
 
 def _scale(editor: Editor, first: Pointer) -> Change:
-    """By how much farther from the centre the corner was pulled."""
-    shown, start = gizmo(editor), editor.placing.placement
-    assert shown is not None and start is not None
-    reach = max(float(np.linalg.norm(first.xy - shown.centre)), 1.0)
+    """By how much farther from what stays the corner was pulled: its foot, or its centre."""
+    start, document = editor.placing.placement, editor.document
+    assert start is not None and document is not None
+    stays = editor.view.canvas_from_image(document.photo.camera.project(editor.placing.pivot()))
+    reach = max(float(np.linalg.norm(first.xy - stays)), 1.0)
 
     def change(now: Pointer, away: float) -> Placement:
-        scale = start.scale * float(np.linalg.norm(now.xy - shown.centre)) / reach
+        scale = start.scale * float(np.linalg.norm(now.xy - stays)) / reach
         if now.shift:
             scale = round(scale / SCALE_SNAP) * SCALE_SNAP
         scale = float(np.clip(scale, MIN_SCALE, MAX_SCALE))
-        return editor.placing.stood(replace(start, scale=scale, depth=start.depth + away))
+        return editor.placing.scaled(replace(start, depth=start.depth + away), scale)
 
     return change
 

@@ -160,8 +160,10 @@ def test_dragging_a_corner_outwards_scales_up(placed: Editor) -> None:
     shown = gizmo(placed)
     assert shown is not None
     corner = shown.corners[0]
-    end = shown.centre + 1.5 * (corner - shown.centre)
+    stays = seen_from(placed, placed.placing.pivot())
+    end = stays + 1.5 * (corner - stays)
     assert stroke(placed, corner, end).scale == pytest.approx(1.5 * START.scale)
+    np.testing.assert_allclose(seen_from(placed, placed.placing.pivot()), stays, atol=PIXEL)
     assert placed.history is not None and placed.history.undo_label == "Scale object"
 
 

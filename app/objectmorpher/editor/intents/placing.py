@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import EditObject, Placement
+from objectmorpher_core.document.model import EditObject, LiftedObject, Placement
 from objectmorpher_core.document.placement import (
     Ground,
     HeldPoint,
     centre_of,
+    foot_of,
     gimbal_of,
+    scaled,
     turned,
     with_centre,
 )
@@ -183,16 +186,32 @@ class Placing:
 
     def turned(self, start: Placement, turn: tuple[float, float, float]) -> Placement:
         """`start` with another turn, about the object's foot or the middle of its outline."""
-        document, thing = self._editor.document, self._editor.object
-        assert document is not None and thing is not None and thing.lifted is not None
-        lifted, camera = thing.lifted, document.photo.camera
-        own = self._editor.derived.body_points(document, self._editor.current)
-        points = lifted.world_points(own)
         try:
-            changed = turned(start, turn, points, lifted, camera, self.gimbal.down)
+            changed = turned(start, turn, *self._standing())
         except ValueError:  # behind the camera, as `move_to` will say
             changed = replace(start, turn=turn)
         return self.stood(changed)
+
+    def scaled(self, start: Placement, scale: float) -> Placement:
+        """`start` with another scale, about the object's foot where it stands."""
+        try:
+            changed = scaled(start, scale, *self._standing())
+        except ValueError:  # likewise
+            changed = replace(start, scale=scale)
+        return self.stood(changed)
+
+    def pivot(self) -> np.ndarray:
+        """(3,) world: what stays while the object grows; its foot where it stands."""
+        assert self.placement is not None
+        return foot_of(self.placement, *self._standing())
+
+    def _standing(self) -> tuple[np.ndarray, LiftedObject, Camera, np.ndarray]:
+        """The object's points (N, 3) world at rest, itself, the camera, and what is down there."""
+        document, thing = self._editor.document, self._editor.object
+        assert document is not None and thing is not None and thing.lifted is not None
+        own = self._editor.derived.body_points(document, self._editor.current)
+        points = thing.lifted.world_points(own)
+        return points, thing.lifted, document.photo.camera, self.gimbal.down
 
     def _offsets(self, placement: Placement) -> np.ndarray:
         """(N, 3) world: where the object's Gaussians are from its centre, turned and scaled."""

@@ -142,11 +142,11 @@ def _change(editor: Editor, group: Group, values: dict[str, float]) -> None:
     placing, was = editor.placing, editor.placing.placement
     assert was is not None, "its numbers are shown"
     right, down, away, yaw, pitch, roll, scale = (values[name] for name in _names())
-    placement = replace(was, move=(right, down), depth=away, scale=scale / 100)
+    placement = replace(was, move=(right, down), depth=away)
     if (yaw, pitch, roll) != placing.angles:
         placement = placing.turned_to(placement, (yaw, pitch, roll))
-    elif group.title != "Position":
-        placement = placing.stood(placement)
+    elif group.title == "Size":
+        placement = placing.scaled(placement, scale / 100)
     placing.move_to(placement)
 
 
