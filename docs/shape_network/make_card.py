@@ -57,7 +57,8 @@ where DINOv2's weights are not there).
 ## What it has seen
 
 {samples} made-up objects of twelve families: creatures, figures, busts, lathe work, boxes,
-furniture, rings and tubes, plants, vehicles, sheets and cloth, superquadrics, extrusions. They are
+furniture, rings and tubes, plants, vehicles, sheets and cloth, superquadrics, extrusions. (A
+thirteenth, prints, flat things with a picture on them, is there for the next training.) They are
 signed distances, drawn by sphere tracing
 (`research/objectmorpher_research/training/shapes`): bevels, holes,
 asymmetry, twists and bends; plain, printed, noisy, striped and photographic materials, matt to
