@@ -81,21 +81,28 @@ def down_at(
     return None
 
 
-def gimbal_of(item: EditObject, document: Document) -> Gimbal:
-    """The axes about which an object is turned: about what is upright there, else the camera's.
+def down_of(item: EditObject, document: Document) -> F64 | None:
+    """(3,) world, unit: what is down for a lifted object, whatever the horizon; None: not known.
 
-    What says nothing itself stands as another object of the photo does, else on the ground.
+    What says nothing itself stands as another object of the photo does.
     """
-    if item.lifted is None:
-        return CAMERA_GIMBAL
-    camera = document.photo.camera
+    assert item.lifted is not None, "only a lifted object stands"
     others = document.objects if item.lifted.origin is None else ()
     for own in (item, *others):
         if own.lifted is not None and (own is item or own.lifted.origin is None):
-            down = down_at(own.lifted, camera, None, own.seen_from)
+            down = down_at(own.lifted, document.photo.camera, None, own.seen_from)
             if down is not None:
-                return Gimbal.about(down)
-    down = down_at(item.lifted, camera, document.horizon)
+                return down
+    return None
+
+
+def gimbal_of(item: EditObject, document: Document) -> Gimbal:
+    """The axes about which an object is turned: about what is upright there, else the camera's."""
+    if item.lifted is None:
+        return CAMERA_GIMBAL
+    down = down_of(item, document)
+    if down is None:
+        down = down_at(item.lifted, document.photo.camera, document.horizon)
     return CAMERA_GIMBAL if down is None else Gimbal.about(down)
 
 
@@ -274,7 +281,7 @@ class Ground:
         """(3,) the point of the ground that is seen in column `x` px, `depth` along z."""
         depth = float(np.clip(depth, NEAREST_GROUND * self.height, FARTHEST * self.height))
         across = (x - camera.cx) / camera.focal * depth
-        down = (self.height - self.normal[2] * depth) / self.normal[1]
+        down = (self.height - self.normal[[0, 2]] @ [across, depth]) / self.normal[1]
         return np.array([across, down, depth])
 
     def stood(self, centre: np.ndarray, offsets: np.ndarray) -> F64:

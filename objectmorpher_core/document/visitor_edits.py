@@ -16,7 +16,7 @@ from ..base.arrays import F64, frozen
 from ..base.camera import Camera
 from .edits import free_name
 from .model import Document, EditObject, LiftedObject, Origin, Placement, Prompt
-from .placement import Ground, GroundError, centre_of, ground_under, with_centre
+from .placement import Ground, GroundError, centre_of, down_of, ground_under, with_centre
 from .settings import USUAL_HARMONY
 
 MOST = 0.6  # of the photo's width and height, that an object takes at most when it comes
@@ -72,7 +72,8 @@ def with_visitor(document: Document, visitor: EditObject) -> Document:
 def ground_for(document: Document, item: EditObject) -> Ground | None:
     """The ground that an object stands on; None where it would be above the horizon.
 
-    That of a visitor is the ground of what is standing in the photo already, if anything is.
+    It lies as the object is seen to stand, else as the horizon says. That of a visitor is the
+    ground of what is standing in the photo already, if anything is.
     """
     camera, row = document.photo.camera, document.horizon
     horizon = document.photo.size[1] / 2 if row is None else row
@@ -81,6 +82,9 @@ def ground_for(document: Document, item: EditObject) -> Ground | None:
     owner = next(iter(standing), item) if item.is_visitor else item
     assert owner.lifted is not None
     points = owner.lifted.world_points(owner.lifted.body.means)
+    if (down := down_of(owner, document)) is not None:
+        height = float((points @ down).max())
+        return Ground(down, height) if height > 0 and down[1] > 0 else None
     try:
         return ground_under(points, camera, horizon)
     except GroundError:

@@ -28,6 +28,7 @@ from objectmorpher_core.document.placement import (
     turned,
     with_centre,
 )
+from objectmorpher_core.document.visitor_edits import ground_for
 from tests import shapes
 from tests.tree import over
 
@@ -246,3 +247,18 @@ def test_what_stands_grows_from_its_foot_and_all_else_from_its_centre(scene, up,
     if not stands:
         np.testing.assert_allclose(feet[0], centre_of(start, lifted, scene.camera), atol=EXACT)
         assert larger == replace(start, scale=1.9)
+
+
+def test_the_ground_lies_as_the_object_stands(scene):
+    """Whatever the horizon is; a contact that is moved over it stays on it, in every direction."""
+    document = replace(scene.document(), horizon=20.0)
+    thing = document.objects[0]
+    thing = replace(thing, lifted=replace(scene.lifted, up=UPS[1], stands=True))
+    ground = ground_for(document.with_object(0, thing), thing)
+    assert ground is not None
+    np.testing.assert_allclose(ground.normal, -np.array(UPS[1]))
+    assert ground.below(_points(scene)).max() == pytest.approx(0, abs=EXACT)
+    hold = replace(_hold(scene, 20.0), point=ground.lowest(_points(scene)), ground=ground)
+    for delta, away in (((30, 8), 0.0), ((-60, 40), 0.7), ((10, -30), -0.2)):
+        motion = hold.moved(np.array(delta, float), away).matrix(scene.lifted, scene.camera)
+        assert abs(ground.below(motion[:3, :3] @ hold.point + motion[:3, 3])) < PLANE * hold.unit

@@ -187,7 +187,8 @@ def gizmo(editor: Editor) -> Gizmo | None:
     far = OUTERMOST * world * zoom + SPACE * view.scale
     near = far + ARROW * view.scale
     side = 1.0 if centre[1] + near < view.height else -1.0
-    row = editor.placing.horizon if thing.is_grounded else None
+    is_asked = thing.is_grounded and editor.placing.needs_horizon
+    row = editor.placing.horizon if is_asked else None
     return Gizmo(
         corners,
         centre,

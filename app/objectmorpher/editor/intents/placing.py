@@ -15,6 +15,7 @@ from objectmorpher_core.document.placement import (
     Ground,
     HeldPoint,
     centre_of,
+    down_of,
     foot_of,
     gimbal_of,
     scaled,
@@ -147,6 +148,14 @@ class Placing:
         document = self._editor.document
         assert document is not None
         return document.photo.size[1] / 2 if document.horizon is None else document.horizon
+
+    @property
+    def needs_horizon(self) -> bool:
+        """Whether nothing but the horizon says how the ground of the current object lies."""
+        document, thing = self._editor.document, self._editor.object
+        if document is None or thing is None or thing.lifted is None:
+            return False
+        return down_of(thing, document) is None
 
     @property
     def is_grounded(self) -> bool:

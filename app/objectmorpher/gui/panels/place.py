@@ -96,7 +96,8 @@ def _draw_ground(editor: Editor) -> None:
         run(editor, "ground")
     if is_on:
         text = editor.placing.why_no_ground
-        note(text or t("Drag the dashed line to the photo's horizon."))
+        if text is not None or editor.placing.needs_horizon:
+            note(text or t("Drag the dashed line to the photo's horizon."))
 
 
 def _draw_title(editor: Editor, group: Group) -> None:

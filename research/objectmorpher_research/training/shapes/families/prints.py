@@ -108,7 +108,8 @@ def _star(rng: Rng) -> F64:
 
 
 def _arrow() -> F64:
-    return np.array([[-1, 0.3], [0.1, 0.3], [0.1, 0.8], [1, 0], [0.1, -0.8], [0.1, -0.3], [-1, -0.3]])
+    half = np.array([[-1, 0.3], [0.1, 0.3], [0.1, 0.8], [1, 0]])
+    return np.concatenate([half, half[2::-1] * [1, -1]])
 
 
 def _fish(rng: Rng) -> F64:
