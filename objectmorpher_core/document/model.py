@@ -379,7 +379,7 @@ class EditObject:
     pose: Pose | None = None  # None: at rest
     placement: Placement = Placement()
     is_visible: bool = True
-    layer: int = 0  # in front of all of a lower one; within a layer the nearer is in front
+    layer: int = 0  # in front of all of a lower one; within a layer the nearer, see compose.order
     coverage: U8 | None = None  # (H, W) where the edge was drawn soft; None: found in the photo
     found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
     shadow: Shadow = field(default_factory=Shadow)

@@ -255,11 +255,15 @@ class PosedSplats:
         return self.world_from_object[:3, :3] @ self.skinned.linear @ np.linalg.inv(world)
 
     @cached_property
-    def middle_depth(self) -> float:
-        """World units: median depth of the control points, or of the Gaussians without a rig."""
-        points = self.motion.motion.points if isinstance(self.motion, Skin) else self.skinned.points
+    def nodes(self) -> F64:
+        """(M, 3) world: the control points; of pieces, which have none of their own, the means."""
+        points = self.rest.lifted.control_points
+        if isinstance(self.motion, Skin):
+            points = self.motion.motion.points
+        elif self.motion is not None:
+            points = self.motion.points
         matrix = self.world_from_object
-        return float(np.median(points @ matrix[2, :3] + matrix[2, 3]))
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def projection_jacobians(points: np.ndarray, focal: float) -> F64:

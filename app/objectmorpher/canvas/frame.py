@@ -139,7 +139,7 @@ def drawn_order(document: Document, shown: Shown, posed: Callable[[int], PosedSp
         for k, o in enumerate(objects)
         if o.lifted is not None and o.is_visible and not is_front(document, k)
     }
-    return back_to_front(objects, there)
+    return back_to_front(document, there)
 
 
 def _parts(
