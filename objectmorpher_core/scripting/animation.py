@@ -74,6 +74,10 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
             size = own.width // times, own.height // times
             origin = replace(origin, camera=_camera(own, times, *size))
         lifted = replace(lifted, texture=texture, middle=None, origin=origin)
+        if matte is not None and matte.paint is not None and (sides := lifted.sides) is not None:
+            own = matte.paint.over(sides.pixels / np.float32(255), sides.left, sides.top)
+            sides = replace(sides, pixels=np.rint(own * 255).astype(np.uint8))
+            lifted = replace(lifted, sides=sides)
     return replace(
         item, mask=mask, coverage=None, found=None, lifted=lifted,
         matte=None if matte is None else _matte(matte, times), mixed=None, contaminated=None,
@@ -93,7 +97,7 @@ def _matte(matte: Matte, times: int) -> Matte:
     inner = matte.box[1] - box[1], matte.box[0] - box[0]
     outer = box[3] - matte.box[3], box[2] - matte.box[2]
     edges = (inner[0], outer[0], inner[1], outer[1])
-    foreground = cv2.copyMakeBorder(matte.foreground, *edges, cv2.BORDER_REPLICATE)
+    foreground = cv2.copyMakeBorder(matte.shown, *edges, cv2.BORDER_REPLICATE)
     own = _means(np.asarray(foreground * alpha[..., None], np.float32), times)
     small = _means(alpha, times)
     beyond = _means(np.asarray(foreground, np.float32), times)

@@ -58,7 +58,7 @@ def encode_page(document: Document, index: int) -> bytes:
     about, data = _packed(arrays)
     about |= _places(document, index, puppet, scale)
     side = tuple(max(round(n * scale), 1) for n in reversed(matte.alpha.shape))
-    foreground = np.rint(np.clip(resized(matte.foreground, *side), 0, 1) * 255).astype(np.uint8)
+    foreground = np.rint(np.clip(resized(matte.shown, *side), 0, 1) * 255).astype(np.uint8)
     alpha = np.rint(np.clip(resized(matte.alpha, *side), 0, 1) * 255).astype(np.uint8)
     plate = resized(to_u8(_background(document, index)), width, height)
     values = {
