@@ -92,7 +92,7 @@ def with_stroke(
     spots = _sampled(values, seen.spots) * seen.is_seen[:, None]
     around = box if old is None else _joined(box, old.box)
     rgba = _mixed(crop(sums, box, around), None if old is None else _unit(old, around), opacity)
-    dots = _mixed(spots, None if old is None else old.spots / np.float32(255), opacity)
+    dots = _mixed(spots, None if old is None else _unit_spots(old), opacity)
     return _with_paint(matte, around, rgba, dots)
 
 
@@ -101,7 +101,7 @@ def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
     if (old := matte.paint) is None:
         return matte
     box, sums = _on_texture(seen, coverage[..., None])
-    rgba, dots = _unit(old, old.box), old.spots / np.float32(255)
+    rgba, dots = _unit(old, old.box), _unit_spots(old)
     rgba[..., 3] *= 1 - np.minimum(crop(sums, box, old.box)[..., 0], 1)
     dots[:, 3] *= 1 - _sampled(coverage, seen.spots) * seen.is_seen
     return _with_paint(matte, old.box, rgba, dots)
@@ -135,7 +135,11 @@ class PaintedShare:
 
 
 def _unit(paint: Paint, box: Box) -> F32:
-    return crop(paint.rgba, paint.box, box) / np.float32(255)
+    return np.asarray(crop(paint.rgba, paint.box, box) / np.float32(255), np.float32)
+
+
+def _unit_spots(paint: Paint) -> F32:
+    return np.asarray(paint.spots / np.float32(255), np.float32)
 
 
 def _mixed(sums: F32, below: F32 | None, opacity: float) -> F32:
@@ -143,10 +147,10 @@ def _mixed(sums: F32, below: F32 | None, opacity: float) -> F32:
     own = np.float32(opacity) * np.minimum(sums[..., :1], 1)
     colour = sums[..., 1:] / np.maximum(sums[..., :1], 1e-6)
     if below is None:
-        return np.concatenate([colour, own], axis=-1)
+        return np.asarray(np.concatenate([colour, own], axis=-1), np.float32)
     rest = (1 - own) * below[..., 3:]
     mixed = (own * colour + rest * below[..., :3]) / np.maximum(own + rest, 1e-6)
-    return np.concatenate([mixed, own + rest], axis=-1)
+    return np.asarray(np.concatenate([mixed, own + rest], axis=-1), np.float32)
 
 
 def _with_paint(matte: Matte, box: Box, rgba: F32, spots: F32) -> Matte:

@@ -48,5 +48,5 @@ class Paint:
 
 
 def _over(rgba: U8, colours: F32) -> F32:
-    share = rgba[..., 3:] / np.float32(255)
-    return np.asarray(colours + share * (rgba[..., :3] / np.float32(255) - colours), np.float32)
+    paint: F32 = rgba.astype(np.float32) / np.float32(255)
+    return colours + paint[..., 3:] * (paint[..., :3] - colours)

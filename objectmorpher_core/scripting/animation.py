@@ -65,7 +65,7 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
     mask = item.mask
     if mask is not None:
         mask = _means(mask[: height * times, : width * times].astype(np.float32), times) > 0.5
-    matte, lifted, placement = item.matte, item.lifted, item.placement
+    matte, lifted, placement = item.matte, item.shown, item.placement
     if lifted is not None:
         texture = replace(lifted.texture, u0=lifted.texture.u0 / np.float32(times))
         origin = lifted.origin
@@ -75,7 +75,8 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
             origin = replace(origin, camera=_camera(own, times, *size))
         lifted = replace(lifted, texture=texture, middle=None, origin=origin)
         if matte is not None and matte.paint is not None and (sides := lifted.sides) is not None:
-            own = matte.paint.over(sides.pixels / np.float32(255), sides.left, sides.top)
+            unit = np.asarray(sides.pixels / np.float32(255), np.float32)
+            own = matte.paint.over(unit, sides.left, sides.top)
             sides = replace(sides, pixels=np.rint(own * 255).astype(np.uint8))
             lifted = replace(lifted, sides=sides)
     return replace(

@@ -40,6 +40,7 @@ __all__ = [
 VERSION = 1
 FORMAT = "objectmorpher session"
 DOCUMENT, ARRAYS = "document.json", "arrays.npz"
+MOST_TEXTURE = 1 << 20  # px, how far from the photo's corner an object's texture may lie
 MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
 MOST_INVENTED = 2_000_000  # px of invented pictures: a small photo has fewer
 

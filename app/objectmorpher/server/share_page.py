@@ -47,7 +47,7 @@ PARTS = ("arap.js", "splat.vert", "splat.frag", "resolve.frag", "view.js")
 def encode_page(document: Document, index: int) -> bytes:
     """Return the page in which object `index` can be dragged; the others are as they were left."""
     item, photo = document.objects[index], document.photo
-    lifted, matte = item.lifted, item.matte
+    lifted, matte = item.shown, item.matte
     assert lifted is not None and matte is not None, "the caller checks"
     scale = min(LONGEST / max(photo.size), 1.0)
     width, height = (max(round(side * scale), 1) for side in photo.size)

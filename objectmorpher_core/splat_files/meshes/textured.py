@@ -199,7 +199,7 @@ def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
 
     Raises SplatFileError where it has no surface.
     """
-    lifted, matte = thing.lifted, thing.matte
+    lifted, matte = thing.shown, thing.matte
     assert lifted is not None, "the caller checks"
     body = lifted.body
     points, triangles = surface_of(body)
