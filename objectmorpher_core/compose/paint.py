@@ -33,6 +33,7 @@ STEEPEST = 5.0  # x the usual texels per px: beyond, two neighbours show differe
 PER_TEXEL = 1.6  # samples along a square's side, for each texel
 MOST_STEPS = 16
 NEAR = 3.0  # x spacing: what is seen lies no farther behind
+FAINT = 4  # of 255: less paint is none
 RIM = 2  # texels, by which paint goes on where the picture ends
 
 
@@ -52,8 +53,14 @@ class Seen:
     parts: tuple[SeenPart, ...]
     spots: F32  # (N, 2) px of the box, where each Gaussian is
     is_seen: Mask  # (N,) and nothing stands before it
+    is_mirrored: Mask  # (N,) it shows what the photo shows of the other side
     alpha: F32  # (h, w) of the object
     color: F32  # (h, w, 3) premultiplied: how it looks, without light and colours of its place
+
+    def mirrored(self, coverage: F32) -> float:
+        """Share of what a stroke covers that is a mirrored back: the front is painted with it."""
+        weights = _sampled(coverage, self.spots) * self.is_seen
+        return float(weights[self.is_mirrored].sum() / max(float(weights.sum()), 1e-6))
 
 
 def look(splats: PosedSplats, matte: Matte, camera: Camera, box: Box) -> Seen:
@@ -75,7 +82,10 @@ def look(splats: PosedSplats, matte: Matte, camera: Camera, box: Box) -> Seen:
     spots = np.asarray(camera.project(splats.means) - box[:2], np.float32)
     depth = _sampled(np.where(np.isfinite(shown.depth), shown.depth, 0), spots)
     is_near = splats.means[:, 2] < depth + NEAR * splats.rest.spacing * splats.scale
-    return Seen(box, tuple(parts), spots, is_near & lifted.is_body, shown.alpha, shown.color)
+    # Without colours of its own, all of an object shows the photo.
+    is_mirrored = (splats.rest.cosines < 0) & (not splats.rest.splatting.has_colors)
+    is_seen = is_near & lifted.is_body
+    return Seen(box, tuple(parts), spots, is_seen, is_mirrored, shown.alpha, shown.color)
 
 
 def with_stroke(
@@ -157,7 +167,7 @@ def _with_paint(matte: Matte, box: Box, rgba: F32, spots: F32) -> Matte:
     """With paint (h, w, 4) in [0, 1] in `box`, of which what is clear is left out."""
     levels, dots = (np.rint(part * 255).clip(0, 255).astype(np.uint8) for part in (rgba, spots))
     for part in (levels, dots):
-        part[part[..., 3] == 0] = 0
+        part[part[..., 3] <= FAINT] = 0
     there = levels[..., 3] > 0
     if not there.any() and not dots.any():
         return replace(matte, paint=None)

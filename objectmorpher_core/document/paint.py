@@ -35,7 +35,7 @@ class Paint:
     @property
     def alpha(self) -> F32:
         """(h, w) in [0, 1]."""
-        return self.rgba[..., 3] / np.float32(255)
+        return self.rgba[..., 3].astype(np.float32) / np.float32(255)
 
     def over(self, colours: F32, left: int, top: int) -> F32:
         """Straight `colours` (h, w, 3) in [0, 1] under it; `left`, `top`: px of their corner."""
@@ -48,5 +48,5 @@ class Paint:
 
 
 def _over(rgba: U8, colours: F32) -> F32:
-    paint: F32 = rgba.astype(np.float32) / np.float32(255)
-    return colours + paint[..., 3:] * (paint[..., :3] - colours)
+    paint = np.asarray(rgba / np.float32(255), np.float32)
+    return np.asarray(colours + paint[..., 3:] * (paint[..., :3] - colours), np.float32)

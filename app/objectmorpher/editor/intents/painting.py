@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 PAINT = "paint"  # kind of chores
 ERASING = (0xFF, 0xFF, 0xFF)  # a stroke's colour
+MIRRORED = 0.3  # of a stroke: then it is said
 CLONING = (0x5A, 0xA9, 0xFF)
 
 
@@ -56,8 +57,8 @@ class _Canvas:
     document: Document
     plate: Plate | None
 
-    def painted(self, laid: _Laid) -> Matte:
-        """Its matte with the stroke; this takes a moment."""
+    def painted(self, laid: _Laid) -> tuple[Matte, bool]:
+        """Its matte with the stroke, and whether that is on a mirrored back; takes a moment."""
         from objectmorpher_core.compose.paint import look, with_stroke, without_stroke
 
         box = laid.stroke.box
@@ -66,12 +67,13 @@ class _Canvas:
         coverage = laid.stroke.coverage[y0:y1, x0:x1]
         seen = look(self.splats, self.matte, self.camera, box)
         if laid.is_erasing:
-            return without_stroke(self.matte, seen, laid.strength * coverage)
+            return without_stroke(self.matte, seen, laid.strength * coverage), False
         colour = np.array(laid.ink, np.float32)
         if laid.source is not None:
             colour, is_there = self._picture(box, laid.source)
             coverage = coverage * is_there
-        return with_stroke(self.matte, seen, coverage, colour, laid.strength)
+        matte = with_stroke(self.matte, seen, coverage, colour, laid.strength)
+        return matte, seen.mirrored(coverage) > MIRRORED
 
     def _picture(
         self, box: tuple[int, int, int, int], aside: tuple[float, float]
@@ -217,11 +219,11 @@ class Painting:
             self._waiting = []
             return
 
-        def work(_: Progress) -> Matte:
+        def work(_: Progress) -> tuple[Matte, bool]:
             return canvas.painted(laid)
 
-        def accept(matte: Matte) -> None:
-            self._ready.append(lambda: self._take(k, laid, canvas.matte, matte))
+        def accept(answer: tuple[Matte, bool]) -> None:
+            self._ready.append(lambda: self._take(k, laid, canvas.matte, *answer))
 
         def drop() -> None:
             self._waiting = []
@@ -235,7 +237,9 @@ class Painting:
             is_quiet=True,
         )  # fmt: skip
 
-    def _take(self, k: int, laid: _Laid, asked: Matte, matte: Matte) -> None:
+    def _take(
+        self, k: int, laid: _Laid, asked: Matte, matte: Matte, is_mirrored: bool
+    ) -> None:  # fmt: skip
         """The paint; dropped where the object is another one by now."""
         editor, document = self._editor, self._editor.committed
         self._waiting = self._waiting[1:]
@@ -247,6 +251,8 @@ class Painting:
             else:
                 label = t("Erase paint") if laid.is_erasing else t("Paint on the object")
                 editor.apply(label, set_paint(document, k, matte.paint))
+                if is_mirrored:
+                    editor.say(t("This back is the front mirrored: both are painted"))
         if self._waiting:
             self._lay()
 
