@@ -17,9 +17,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, F64, Mask
+from ..base.arrays import F32, F64, U8, Mask
 from ..base.camera import Camera
-from ..base.pixels import crop
 from ..document.model import LiftedObject, Matte
 from ..document.paint import Paint
 from ..raster import tiles
@@ -97,13 +96,11 @@ def with_stroke(
     """
     whole = np.broadcast_to(np.asarray(colour, np.float32), (*coverage.shape, 3))
     values = np.dstack([coverage, coverage[..., None] * whole])
-    old = matte.paint
+    old = matte.paint or Paint((), np.zeros((len(seen.spots), 4), np.uint8))
     box, sums = _on_texture(seen, values)
     spots = _sampled(values, seen.spots) * seen.is_seen[:, None]
-    around = box if old is None else _joined(box, old.box)
-    rgba = _mixed(crop(sums, box, around), None if old is None else _unit(old, around), opacity)
-    dots = _mixed(spots, None if old is None else _unit_spots(old), opacity)
-    return _with_paint(matte, around, rgba, dots)
+    rgba = _mixed(sums, _unit(old.crop(box)), opacity)
+    return _with_paint(matte, old, box, rgba, _mixed(spots, _unit(old.spots), opacity))
 
 
 def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
@@ -111,10 +108,10 @@ def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
     if (old := matte.paint) is None:
         return matte
     box, sums = _on_texture(seen, coverage[..., None])
-    rgba, dots = _unit(old, old.box), _unit_spots(old)
-    rgba[..., 3] *= 1 - np.minimum(crop(sums, box, old.box)[..., 0], 1)
+    rgba, dots = _unit(old.crop(box)), _unit(old.spots)
+    rgba[..., 3] *= 1 - np.minimum(sums[..., 0], 1)
     dots[:, 3] *= 1 - _sampled(coverage, seen.spots) * seen.is_seen
-    return _with_paint(matte, old.box, rgba, dots)
+    return _with_paint(matte, old, box, rgba, dots)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +129,8 @@ class PaintedShare:
         texture = object_texture(matte, splats.rest.lifted)
         height, width = texture.levels[0].shape[:2]
         left, top = int(texture.left), int(texture.top)
-        alpha = crop(paint.alpha, paint.box, (left, top, left + width, top + height))
-        levels = build_levels(np.dstack([alpha] * 3), texture.levels[0][..., 3], left, top)
+        alpha = _unit(paint.crop((left, top, left + width, top + height))[..., 3:])
+        levels = build_levels(np.repeat(alpha, 3, axis=2), texture.levels[0][..., 3], left, top)
         spots = np.repeat(paint.spots[:, 3:] / np.float32(255), 3, axis=1)
         if len(spots) == len(splats):  # else some were split, whose paint is told with the texture
             splats = splats.recoloured(spots)
@@ -144,38 +141,26 @@ class PaintedShare:
         return tiles.draw(self.drawable, self.levels, box).color[..., 0].copy()
 
 
-def _unit(paint: Paint, box: Box) -> F32:
-    return np.asarray(crop(paint.rgba, paint.box, box) / np.float32(255), np.float32)
+def _unit(levels: U8) -> F32:
+    return np.asarray(levels / np.float32(255), np.float32)
 
 
-def _unit_spots(paint: Paint) -> F32:
-    return np.asarray(paint.spots / np.float32(255), np.float32)
-
-
-def _mixed(sums: F32, below: F32 | None, opacity: float) -> F32:
+def _mixed(sums: F32, below: F32, opacity: float) -> F32:
     """Straight (..., 4) of a stroke's alpha and premultiplied colours (..., 4) over `below`."""
     own = np.float32(opacity) * np.minimum(sums[..., :1], 1)
     colour = sums[..., 1:] / np.maximum(sums[..., :1], 1e-6)
-    if below is None:
-        return np.asarray(np.concatenate([colour, own], axis=-1), np.float32)
     rest = (1 - own) * below[..., 3:]
     mixed = (own * colour + rest * below[..., :3]) / np.maximum(own + rest, 1e-6)
     return np.asarray(np.concatenate([mixed, own + rest], axis=-1), np.float32)
 
 
-def _with_paint(matte: Matte, box: Box, rgba: F32, spots: F32) -> Matte:
-    """With paint (h, w, 4) in [0, 1] in `box`, of which what is clear is left out."""
+def _with_paint(matte: Matte, old: Paint, box: Box, rgba: F32, spots: F32) -> Matte:
+    """With paint (h, w, 4) in [0, 1] in `box`, and on the Gaussians, over that of before."""
     levels, dots = (np.rint(part * 255).clip(0, 255).astype(np.uint8) for part in (rgba, spots))
     for part in (levels, dots):
         part[part[..., 3] <= FAINT] = 0
-    there = levels[..., 3] > 0
-    if not there.any() and not dots.any():
-        return replace(matte, paint=None)
-    rows, columns = np.flatnonzero(there.any(1)), np.flatnonzero(there.any(0))
-    top, bottom = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, 0)
-    left, right = (int(columns[0]), int(columns[-1]) + 1) if len(columns) else (0, 0)
-    inner = levels[top:bottom, left:right].copy()
-    return replace(matte, paint=Paint(box[0] + left, box[1] + top, inner, dots))
+    paint = replace(old.with_pixels(box, levels), spots=dots)
+    return replace(matte, paint=paint if paint.tiles or dots.any() else None)
 
 
 def _sampled(values: F32, at: F32) -> F32:
@@ -264,7 +249,3 @@ def _continued(values: F32, there: Mask) -> F32:
         values = np.where(is_new[..., None], near, values).astype(np.float32)
         there = there | is_new
     return values
-
-
-def _joined(a: Box, b: Box) -> Box:
-    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])

@@ -35,6 +35,7 @@ from ..document.model import (
     Plate,
     Sides,
 )
+from ..document.paint import Paint
 from ..document.pose import Base, Pose
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width, cut_out
@@ -127,8 +128,7 @@ def _repainted(matte: Matte, item: EditObject, lifted: LiftedObject) -> Matte:
     spots = np.where((gaps < reach)[:, None], paint.spots[nearest], 0)
     paint, sides = replace(paint, spots=spots), (old.sides, lifted.sides)
     if sides[0] is None or sides[1] is None or not _same_pictures(sides[0], sides[1]):
-        inner = crop(paint.rgba, paint.box, matte.box)
-        paint = replace(paint, left=matte.left, top=matte.top, rgba=inner)
+        paint = Paint((), paint.spots).with_pixels(matte.box, paint.crop(matte.box))
     return replace(matte, paint=paint)
 
 

@@ -27,6 +27,7 @@ from ..base.files import OutputError, reason_of, write_all
 from ..base.limits import PICTURE_PIXELS, SESSION_DOCUMENT, SESSION_OBJECTS
 from ..base.quoting import named, shown
 from ..document.model import SELECTED, Document, EditObject, KeyPose, Photo
+from ..document.paint import SIDE
 from ..document.settings import LEAST_FEATHER, MOST_FEATHER
 from ..pictures.image import ImageError, encode_picture, read_picture
 from .tree import ArrayError, SessionError, TreeReader, TreeWriter, read_npy
@@ -308,6 +309,7 @@ def _check(document: Document) -> None:
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
             _near("matte", item.matte.box, _size_around(item, (width, height)))
+        _check_paint(item)
         _check_lifted(item)
     if document.horizon is not None and abs(document.horizon) > MAX_HORIZON * height:
         raise ValueError(f"a horizon at {document.horizon:g} px is far outside the photo")
@@ -357,6 +359,19 @@ def _check_coverage(item: EditObject) -> None:
         shape = None if item.mask is None else item.mask.shape
         if of_photo is not None:
             _same("a part of a mask", (of_photo.shape, of_photo.dtype), (shape, np.dtype(bool)))
+
+
+def _check_paint(item: EditObject) -> None:
+    paint = None if item.matte is None else item.matte.paint
+    if paint is None:
+        return
+    if item.lifted is None:
+        raise ValueError("an object that is not lifted is painted")
+    _same("paint on Gaussians", paint.spots.shape, (len(item.lifted.gaussians), 4))
+    for tile in paint.tiles:
+        _same("paint", tile.rgba.shape, (SIDE, SIDE, 4))
+        if max(abs(tile.left), abs(tile.top)) > MOST_TEXTURE or tile.left % SIDE or tile.top % SIDE:
+            raise ValueError("paint lies where no texture is")
 
 
 def _check_lifted(item: EditObject) -> None:

@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document.model import Document, Matte, Placement, Plate
 from objectmorpher_core.document.settings import AS_IN_THE_PHOTO
 
@@ -206,7 +205,7 @@ class Lights:
             _mark(touched, small, (plate.left, plate.top), pitch, (view, cell))
         for matte in mattes:
             if matte.paint is not None:
-                there = crop(matte.paint.alpha, matte.paint.box, matte.box) > 0
+                there = matte.paint.crop(matte.box)[..., 3] > 0
                 _mark(touched, there, (matte.left, matte.top), 1.0, (view, cell))
         return touched
 

@@ -219,7 +219,7 @@ class Painting:
             self._waiting = []
             return
 
-        def work(_: Progress) -> tuple[Matte, bool]:
+        def work(progress: Progress) -> tuple[Matte, bool]:
             return canvas.painted(laid)
 
         def accept(answer: tuple[Matte, bool]) -> None:
