@@ -224,7 +224,11 @@ def _spread(part: SeenPart, values: np.ndarray) -> tuple[np.ndarray, F64] | None
     if not is_whole.any():
         return None
     usual = float(np.median(longest[is_whole]))
-    row, column = np.nonzero(is_whole & (longest < STEEPEST * max(usual, 1.0)))
+    is_whole &= longest < STEEPEST * max(usual, 1.0)
+    is_whole &= _around(values[..., 0] > 0, int(np.ceil(1 / max(usual, 0.05))) + 1)[:-1, :-1]
+    row, column = np.nonzero(is_whole)
+    if not len(row):
+        return None
     steps = np.ceil(PER_TEXEL * longest[row, column]).clip(1, MOST_STEPS).astype(int)
     places, amounts = [], []
     for n in np.unique(steps):
@@ -238,6 +242,12 @@ def _spread(part: SeenPart, values: np.ndarray) -> tuple[np.ndarray, F64] | None
         places.append(np.floor(place).astype(np.int64).reshape(-1, 2))
         amounts.append(np.asarray(value, np.float64).reshape(-1, values.shape[2]))
     return np.concatenate(places), np.concatenate(amounts)
+
+
+def _around(there: Mask, px: int) -> Mask:
+    """(h, w) what is `there`, and so many px around it."""
+    kernel = np.ones((2 * px + 1, 2 * px + 1), np.uint8)
+    return np.asarray(cv2.dilate(there.astype(np.uint8), kernel) > 0)
 
 
 def _continued(values: F32, there: Mask) -> F32:

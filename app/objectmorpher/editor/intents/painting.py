@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +13,8 @@ from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.pixels import crop, unit_pixels
 from objectmorpher_core.base.progress import Progress
-from objectmorpher_core.document.model import Document, Matte, Plate
-from objectmorpher_core.document.paint_edits import set_paint
+from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
+from objectmorpher_core.document.paint_edits import without_paint
 
 from ...canvas.layer import CanvasLayer
 from ...system.texts import t
@@ -25,6 +25,7 @@ from .composing import stroke_tint
 if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
 
+    from ...canvas.shape import CanvasShape
     from ..state import EditorState
 
 PAINT = "paint"  # kind of chores
@@ -48,17 +49,36 @@ class _Laid:
 
 
 @dataclass(frozen=True, eq=False)
+class _Painted:
+    """An object with a stroke."""
+
+    item: EditObject
+    shape: CanvasShape
+    is_mirrored: bool  # the stroke is on a back that is the front
+
+
+@dataclass(frozen=True, eq=False)
 class _Canvas:
     """What is painted on: an object as the edit has put it, before a background."""
 
-    splats: PosedSplats
+    item: EditObject
     matte: Matte
+    shape: CanvasShape
+    splats: PosedSplats
     camera: Camera
     document: Document
     plate: Plate | None
 
-    def painted(self, laid: _Laid) -> tuple[Matte, bool]:
-        """Its matte with the stroke, and whether that is on a mirrored back; takes a moment."""
+    def painted(self, laid: _Laid) -> _Painted:
+        """It with the stroke; this takes a moment."""
+        matte, is_mirrored = self._painted(laid)
+        if matte.paint is self.matte.paint:
+            return _Painted(self.item, self.shape, is_mirrored)
+        item = replace(self.item, matte=matte)
+        return _Painted(item, self.shape.changed_to(item), is_mirrored)
+
+    def _painted(self, laid: _Laid) -> tuple[Matte, bool]:
+        """Its matte with the stroke, and whether that is on a mirrored back."""
         from objectmorpher_core.compose.paint import look, with_stroke, without_stroke
 
         box = laid.stroke.box
@@ -178,7 +198,7 @@ class Painting:
         """The current object without any paint; one step."""
         editor, document = self._editor, self._editor.committed
         if document is not None and editor.object is not None and editor.object.is_painted:
-            editor.apply(t("Remove paint"), set_paint(document, editor.current, None))
+            editor.apply(t("Remove paint"), without_paint(document, editor.current))
 
     def deliver(self) -> bool:
         """Takes in what was painted, between strokes; once a frame."""
@@ -207,10 +227,13 @@ class Painting:
         item = document.objects[k]
         if item.lifted is None or item.matte is None:
             return None
-        splats, plate = editor.derived.posed(document, k), None
-        if any(each.is_moved for each in document.objects):
-            plate = editor.derived.plate(document)
-        return _Canvas(splats, item.matte, document.photo.camera, document, plate)
+        shape, splats = (
+            editor.derived.shape(document.photo, item),
+            editor.derived.posed(document, k),
+        )
+        is_edited = any(each.is_moved for each in document.objects)
+        plate = editor.derived.plate(document) if is_edited else None
+        return _Canvas(item, item.matte, shape, splats, document.photo.camera, document, plate)
 
     def _lay(self) -> None:
         """The first stroke that waits, on the object as it is now."""
@@ -219,11 +242,11 @@ class Painting:
             self._waiting = []
             return
 
-        def work(progress: Progress) -> tuple[Matte, bool]:
+        def work(progress: Progress) -> _Painted:
             return canvas.painted(laid)
 
-        def accept(answer: tuple[Matte, bool]) -> None:
-            self._ready.append(lambda: self._take(k, laid, canvas.matte, *answer))
+        def accept(answer: _Painted) -> None:
+            self._ready.append(lambda: self._take(k, laid, canvas.item, answer))
 
         def drop() -> None:
             self._waiting = []
@@ -237,21 +260,19 @@ class Painting:
             is_quiet=True,
         )  # fmt: skip
 
-    def _take(
-        self, k: int, laid: _Laid, asked: Matte, matte: Matte, is_mirrored: bool
-    ) -> None:  # fmt: skip
+    def _take(self, k: int, laid: _Laid, asked: EditObject, answer: _Painted) -> None:
         """The paint; dropped where the object is another one by now."""
         editor, document = self._editor, self._editor.committed
         self._waiting = self._waiting[1:]
-        now = document.objects[k].matte if document and k < len(document.objects) else None
+        now = document.objects[k] if document and k < len(document.objects) else None
         if document is not None and now is asked:
-            if matte is asked or matte.paint is asked.paint:
-                editor.say(t("There is nothing of {name} to paint on",
-                             name=document.objects[k].name))  # fmt: skip
+            if answer.item is asked:
+                editor.say(t("There is nothing of {name} to paint on", name=asked.name))
             else:
+                editor.derived.remember(answer.item, answer.shape)
                 label = t("Erase paint") if laid.is_erasing else t("Paint on the object")
-                editor.apply(label, set_paint(document, k, matte.paint))
-                if is_mirrored:
+                editor.apply(label, document.with_object(k, answer.item))
+                if answer.is_mirrored:
                     editor.say(t("This back is the front mirrored: both are painted"))
         if self._waiting:
             self._lay()
