@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, RGB, Mask
+from ..base.arrays import F32, RGB, U8, Mask
 from ..base.camera import Camera
 from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
@@ -26,6 +26,7 @@ from ..compose.composite import composite
 from ..deform.puppet import Puppet, puppet_of
 from ..document.key_edits import at_key, count_keys
 from ..document.model import Document, EditObject, Handle, Matte, Photo, Placement, Plate, Pose
+from ..document.paint import Paint
 from ..pictures.image import to_u8
 
 Box = tuple[int, int, int, int]
@@ -65,7 +66,7 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
     mask = item.mask
     if mask is not None:
         mask = _means(mask[: height * times, : width * times].astype(np.float32), times) > 0.5
-    matte, lifted, placement = item.matte, item.shown, item.placement
+    matte, lifted, placement = item.matte, item.lifted, item.placement
     if lifted is not None:
         texture = replace(lifted.texture, u0=lifted.texture.u0 / np.float32(times))
         origin = lifted.origin
@@ -75,8 +76,7 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
             origin = replace(origin, camera=_camera(own, times, *size))
         lifted = replace(lifted, texture=texture, middle=None, origin=origin)
         if matte is not None and matte.paint is not None and (sides := lifted.sides) is not None:
-            unit = np.asarray(sides.pixels / np.float32(255), np.float32)
-            own = matte.paint.over(unit, sides.left, sides.top)
+            own = matte.paint.over(_unit(sides.pixels), sides.left, sides.top)
             sides = replace(sides, pixels=np.rint(own * 255).astype(np.uint8))
             lifted = replace(lifted, sides=sides)
     return replace(
@@ -98,12 +98,21 @@ def _matte(matte: Matte, times: int) -> Matte:
     inner = matte.box[1] - box[1], matte.box[0] - box[0]
     outer = box[3] - matte.box[3], box[2] - matte.box[2]
     edges = (inner[0], outer[0], inner[1], outer[1])
-    foreground = cv2.copyMakeBorder(matte.shown, *edges, cv2.BORDER_REPLICATE)
+    foreground = cv2.copyMakeBorder(matte.foreground, *edges, cv2.BORDER_REPLICATE)
     own = _means(np.asarray(foreground * alpha[..., None], np.float32), times)
     small = _means(alpha, times)
     beyond = _means(np.asarray(foreground, np.float32), times)
     straight = np.where(small[..., None] > 0, own / np.maximum(small, 1e-6)[..., None], beyond)
-    return Matte(box[0] // times, box[1] // times, small, straight)
+    left, top, paint = box[0] // times, box[1] // times, None
+    if matte.paint is not None:  # of the photo's part; that of the sides is in their pictures
+        rgba = _unit(matte.paint.crop(box))
+        own = _means(np.dstack([rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]]), times)
+        own[..., :3] /= np.maximum(own[..., 3:], 1e-6)
+        levels = np.rint(255 * own).astype(np.uint8)
+        height, width = small.shape
+        paint = Paint((), matte.paint.spots)
+        paint = paint.with_pixels((left, top, left + width, top + height), levels)
+    return Matte(left, top, small, straight, paint)
 
 
 def _plate(plate: Plate, times: int, photo: np.ndarray) -> Plate:
@@ -137,6 +146,10 @@ def _aligned(box: Box, times: int) -> Box:
         -(-x1 // times) * times,
         -(-y1 // times) * times,
     )
+
+
+def _unit(levels: U8) -> F32:
+    return np.asarray(levels / np.float32(255), np.float32)
 
 
 def _means(values: F32, times: int) -> F32:

@@ -20,6 +20,7 @@ from objectmorpher_core.document.paint_edits import set_painted
 from objectmorpher_core.lift.refitting import carried_over
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster.posed import PosedSplats
+from objectmorpher_core.scripting.animation import shrunk
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
@@ -186,3 +187,14 @@ def test_a_mirrored_back_is_told_from_a_front():
         seen = look(_posed(document), matte, document.photo.camera, stroke.box)
         share = seen.mirrored(stroke.coverage[y0:y1, x0:x1])
         assert share > 0.9 if is_back else share < 0.02
+
+
+def test_a_small_video_shows_paint_as_the_edit_does():
+    for place in ("at rest", "turned"):
+        painted = _placed(PLACES[place], _painted(_placed(PLACES["at rest"]), _stroke(_scene())))
+        small, large = composite(shrunk(painted, 2)).pixels, composite(painted).pixels
+        plain = composite(shrunk(_placed(PLACES[place]), 2)).pixels
+        large = cv2.resize(large, small.shape[1::-1], interpolation=cv2.INTER_AREA)
+        is_painted = np.abs(small.astype(int) - plain).max(-1) > 4 * NEAR
+        assert is_painted.sum() > 100
+        assert np.abs(small.astype(int) - large)[is_painted].mean() < NEAR / 3
