@@ -70,9 +70,9 @@ def draw_compose(editor: Editor) -> None:
         return
     _draw_background(editor)
     rule()
-    _draw_finish(editor)  # before those to which it adds fields
-    rule()
     _draw_paint(editor)
+    rule()
+    _draw_finish(editor)  # before those to which it adds fields
     rule()
     _draw_shadow(editor)
     rule()
