@@ -190,8 +190,15 @@ class Edit:
         return self.options(move=(dx, dy, dz))
 
     def turn(self, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Edit:
-        """The whole object turns by so many degrees."""
+        """The whole object turns by so many degrees, about the camera's axes."""
         return self.options(turn=(yaw, pitch, roll))
+
+    def spin(self, degrees: float) -> Edit:
+        """The whole object turns where it stands, about its own upright axis, before `turn`.
+
+        A positive angle turns its front to the left.
+        """
+        return self.options(spin=degrees)
 
     def scale(self, factor: float) -> Edit:
         """The whole object is so many times as large."""
@@ -200,8 +207,8 @@ class Edit:
     def key(self, **pose: Any) -> Edit:
         """Add a key pose, through which a video of the kind keys goes after the edit's own pose.
 
-        `pose` has pin, handle, move, turn and scale as a script has them; what it does not say is
-        at rest. An edit has at most eleven of them.
+        `pose` has pin, handle, move, turn, spin and scale as a script has them; what it does not
+        say is at rest. An edit has at most eleven of them.
         """
         return self.options(key=[*self.script.key, pose])
 

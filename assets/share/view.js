@@ -42,9 +42,11 @@ function inverse(m) {
     c * d - a * f, d * h - e * g, b * g - a * h, a * e - b * d].map((v) => v / det);
 }
 
-function rotation(axis, degrees) {
-  const t = degrees * Math.PI / 180, c = Math.cos(t), s = Math.sin(t);
-  return axis === "x" ? [1, 0, 0, 0, c, -s, 0, s, c] : [c, 0, s, 0, 1, 0, -s, 0, c];
+function rotation([x, y, z], degrees) {  // about a direction of the length 1
+  const t = degrees * Math.PI / 180, c = Math.cos(t), s = Math.sin(t), d = 1 - c;
+  return [c + d * x * x, d * x * y - s * z, d * x * z + s * y,
+    d * x * y + s * z, c + d * y * y, d * y * z - s * x,
+    d * x * z - s * y, d * y * z + s * x, c + d * z * z];
 }
 
 function matrixOf(q, at) {  // wxyz
@@ -114,10 +116,11 @@ class Thing {
     return shown.reduce((a, b) => (a.far <= b.far ? a : b));
   }
 
-  // Turns the whole object about its centre, in camera axes.
+  // Turns the whole object about its centre: by yaw about its own upright, by pitch about the camera's x axis.
   rotate(yaw, pitch) {
     const centre = plus(times(this.turn, this.data.middle), this.shift);
-    const by = product(rotation("x", pitch), rotation("y", yaw));
+    const down = times(this.turn, this.data.down), length = Math.hypot(...down);
+    const by = product(rotation([1, 0, 0], pitch), rotation(down.map((v) => v / length), yaw));
     this.turn = product(by, this.turn);
     this.shift = plus(centre, times(by, minus(this.shift, centre)));
   }

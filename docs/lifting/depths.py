@@ -7,14 +7,14 @@ from pathlib import Path
 import mesh_view
 import numpy as np
 from solids import SOLIDS, Solid, load
-from turning import AT, CAMERA, SHARE, SIDE, Shot, over_plate
+from turning import AT, CAMERA, SEEN, SHARE, SIDE, Shot, over_plate
 
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift.relief import shape_look
+from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.body import ReliefBody
-from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
-from objectmorpher_core.lift.shapes import completed, recognised
+from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_research.training.shape_eval import ShapeError, Surfaces, score, surfaces_of
 
 YAWS = range(0, 360, 45)  # degrees, from the side that the page's photo shows
@@ -37,15 +37,10 @@ def _scores(solid: Solid) -> dict[str, ShapeError]:
     mask = (view.alpha > 0.5) & np.isfinite(view.depth)
     pixels = np.clip(over_plate(Shot(view.color, view.alpha)) * 255 + 0.5, 0, 255).astype(np.uint8)
     outline = ReliefSilhouette.of(mask)
-    standing = ReliefBody.of(outline, CAMERA, LiftSettings())
-    seen = shape_look.look(pixels, mask, CAMERA)
-    assert seen is not None, "the network's weights are here"
-    network = fused(standing, seen, CAMERA, 1.0, 1.0)
-    if (shape := recognised(seen)) is not None:
-        network = completed(network, shape, CAMERA, 1.0, 1.0)
+    subject = LiftSubject(pixels, CAMERA, mask, cut_out(pixels, mask))
     bodies = {
-        "network": network,
-        "relief": standing,
+        "network": ReliefLifter().body(subject, SEEN),
+        "relief": ReliefBody.of(outline, CAMERA, LiftSettings()),
         "inflation": ReliefBody.of(outline, CAMERA, LiftSettings(is_standing=False)),
     }
     ways = {way: surfaces_of(body, mask) for way, body in bodies.items()}

@@ -33,7 +33,8 @@ the Shape panel, overrules all that.
 How much of the truth is that? Solids whose every view is known are drawn into a photo (512 px, 50
 degrees of view, over a blurred picture, seen from 6 to 18 degrees above, the ring from 50), lifted
 with the default settings under their exact mask, and edited: turned by 10, 20 and 35 degrees to
-both sides, pitched by 20 both ways, brought nearer by three tenths of their distance, and bent by
+both sides about the camera's axis, spun by 20 and 35 about their own upright (which the product
+has to find), pitched by 20 both ways, brought nearer by three tenths of their distance, and bent by
 40 degrees towards the camera and away (all control points are led along the same bend). The
 lighting is painted on. What comes out is compared with the true view:
 
@@ -119,7 +120,8 @@ object hides of another counts as invented although it may stay hidden.
 
 ## Sixteen photos
 
-`python docs/lifting/sheet.py` turns them. Wobble is that of the turned outline over that at rest.
+`python docs/lifting/sheet.py` turns them, as the Place tool does: what is seen to stand, as the cup
+does, about its own upright. Wobble is that of the turned outline over that at rest.
 
 ![Sixteen photos, turned by 15, 25 and 35 degrees to both sides and pitched by 20](turned.jpg)
 """

@@ -20,6 +20,7 @@ from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import DeformSettings, Document, Placement
+from objectmorpher_core.document.placement import gimbal_of
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, open_photo, select
 from objectmorpher_core.raster.trust import trust_in
@@ -96,9 +97,10 @@ def measured(name: str, document: Document) -> tuple[list[Row], list[np.ndarray]
     texture = object_texture(item.matte, item.lifted)
     puppet = Puppet(item.lifted, DeformSettings(), camera)
     rest = puppet.draw(None, Placement(), texture, camera)
+    gimbal = gimbal_of(item, document)
     still, rows, pictures = outline_of(rest.alpha), [], []
     for turn in TURNS:
-        place = Placement(turn=turn)
+        place = Placement(turn=gimbal.turn(turn))
         picture, trust = (
             puppet.draw(None, place, texture, camera),
             trust_in(puppet.posed(None, place)),

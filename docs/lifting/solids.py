@@ -218,6 +218,12 @@ HELD_OUT: dict[str, tuple[Maker, View]] = {
 MADE = ("figure", "mug", "box")  # here: nothing is fetched for them
 
 
+def upright(name: str) -> F64:
+    """(3,) camera axes: what is down of the solid called `name` as the photo sees it."""
+    _, side = (SOLIDS | HELD_OUT)[name]
+    return turn_matrix(*side)[:, 1]
+
+
 def load(name: str, meshes: Path) -> Solid:
     """The solid called `name` as the photo sees it; `meshes` is not read for one that is MADE."""
     make, side = (SOLIDS | HELD_OUT)[name]

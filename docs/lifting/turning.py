@@ -18,13 +18,13 @@ import cv2
 import mesh_view
 import numpy as np
 from skimage import data
-from solids import Solid, load
+from solids import Solid, load, upright
 
 from objectmorpher_core.base.arrays import F64, Mask, Pixels
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.base.progress import silent
-from objectmorpher_core.base.rotations import turn_matrix
+from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal, turn_matrix, turn_of
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import DeformSettings, LiftSettings, Matte, Placement, Pose
@@ -54,17 +54,17 @@ class Edit:
     group: str  # of edits whose scores are averaged
     yaw: float = 0.0  # degrees
     pitch: float = 0.0
+    spin: float = 0.0  # degrees about its own upright
     nearer: float = 0.0  # x its distance
     bend: float = 0.0  # degrees between its upper and its lower end, away from the camera
 
-    @property
-    def turn(self) -> F64:
-        """(3, 3)"""
-        return turn_matrix(self.yaw, self.pitch, 0)
+    def turn(self, gimbal: Gimbal) -> F64:
+        """(3, 3) of a solid that stands as a gimbal says."""
+        return turn_matrix(self.yaw, self.pitch, 0) @ gimbal.matrix(self.spin, 0, 0)
 
-    def moved(self, points: F64, centre: F64) -> F64:
+    def moved(self, points: F64, centre: F64, gimbal: Gimbal) -> F64:
         """Where world points (n, 3) of a solid about `centre` (3,) go."""
-        around = (points - centre) @ self.turn.T
+        around = (points - centre) @ self.turn(gimbal).T
         if self.bend:
             around, _ = bent(around, float(np.ptp(around[:, 1])), self.bend)
         return around + (1 - self.nearer) * centre
@@ -73,6 +73,7 @@ class Edit:
 EDITS = {
     **{f"yaw {a}": Edit(f"turn {abs(a)}", yaw=a) for a in (-35, -20, -10, 10, 20, 35)},
     **{f"pitch {a}": Edit("pitch 20", pitch=a) for a in (-20, 20)},
+    **{f"spin {a}": Edit(f"spin {abs(a)}", spin=a) for a in (-35, -20, 20, 35)},
     "nearer": Edit("nearer by 0.3", nearer=0.3),
     **{f"bend {a}": Edit("bend 40", bend=a) for a in (-40, 40)},
 }
@@ -107,6 +108,7 @@ class Scene:
     photo: Shot
     edited: dict[str, Shot]  # by name
     centre: F64  # (3,) world, about which it turns
+    gimbal: Gimbal  # how it stands
     shown: F64  # (n, 2) px of points that the photo shows
     moved: dict[str, F64]  # (n, 2) px of them, by the edit's name
     inverse: F64  # (h, w) true inverse depth of the photo; what is behind is farther away
@@ -142,14 +144,15 @@ def make_scene(name: str, meshes: Path) -> Scene:
     points = (rest[of] * weights[:, :, None]).sum(1)
     column, row = np.clip(CAMERA.project(points).astype(int), 0, SIDE - 1).T
     points = points[np.abs(points[:, 2] - view.depth[row, column]) < SAME_DEPTH]
+    gimbal = Gimbal.about(upright(name))
     shots, moved = {}, {}
     for key, edit in EDITS.items():
-        world = edit.moved(np.concatenate([rest, points]), centre)
+        world = edit.moved(np.concatenate([rest, points]), centre, gimbal)
         shots[key] = _shot(mesh_view.draw(solid, world[: len(rest)], CAMERA))
         moved[key] = CAMERA.project(world[len(rest) :])
     inverse = np.where(np.isfinite(view.depth), 1 / view.depth, 0.5 / view.depth.min())
     shown = CAMERA.project(points)
-    return Scene(name, _shot(view), shots, centre, shown, moved, inverse)
+    return Scene(name, _shot(view), shots, centre, gimbal, shown, moved, inverse)
 
 
 def _shot(view: mesh_view.View) -> Shot:
@@ -221,7 +224,10 @@ def _drawn(puppet: Puppet, texture: TextureLevels, edit: Edit, shift: F64) -> Sh
     lifted = puppet.lifted
     away = -edit.nearer * lifted.centre[2] / (lifted.diameter * lifted.scale)
     move = (float(shift[0]), float(shift[1]))
-    place = Placement(move=move, depth=float(away), turn=(edit.yaw, edit.pitch, 0))
+    # The product's own turn: about what is upright where its shape says so, else the camera's axis.
+    up = None if lifted.up is None else -np.array(lifted.up)
+    gimbal = CAMERA_GIMBAL if up is None else Gimbal.about(up)
+    place = Placement(move=move, depth=float(away), turn=turn_of(edit.turn(gimbal)))
     pose = None
     if edit.bend:
         height = float(np.ptp(lifted.gaussians.means[:, 1]))
@@ -248,7 +254,7 @@ def middle_of(alpha: F64) -> F64:
 
 def _card(scene: Scene, matte: Matte, edit: Edit) -> F64:
     """(3, 3) the homography of a flat board at the depth of the solid's middle."""
-    turn, depth = edit.turn, scene.centre[2]
+    turn, depth = edit.turn(scene.gimbal), scene.centre[2]
     intrinsics = np.array([[CAMERA.focal, 0, CAMERA.cx], [0, CAMERA.focal, CAMERA.cy], [0, 0, 1]])
     alpha = crop(matte.alpha, matte.box, (0, 0, SIDE, SIDE))
     middle = CAMERA.unproject(middle_of(alpha.astype(np.float64)), depth)

@@ -141,8 +141,10 @@ def _turn_cup(guide: Guide) -> None:
         guide.shoot("Rotation ring", "A few degrees about the line of sight.")
     guide.choose("Tool: Place")
     x, y = guide.place("Ring: yaw")
-    with guide.dragging((x, y), (x - 48, y)):
-        guide.shoot("Place", "All of it turns; the number beside the pointer says how far.")
+    with guide.dragging((x, y), (x - 110, y)):
+        guide.shoot(
+            "Place", "All of it turns on the table, about its own upright; the number says how far."
+        )
     guide.pull("Scale", 32)
     look(guide, (300, 220), (250, 200), "The cup from elsewhere, as far as one photo tells.")
     split(guide, (280, 200), "Photo and edit.")

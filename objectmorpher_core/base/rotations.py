@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .arrays import F64
@@ -128,3 +130,66 @@ def turn_of(matrix: np.ndarray) -> tuple[float, float, float]:
         yaw = np.arctan2(-matrix[2, 0], matrix[2, 2])
         roll = np.arctan2(-matrix[0, 1], matrix[1, 1])
     return float(np.degrees(yaw)), float(np.degrees(pitch)), float(np.degrees(roll))
+
+
+@dataclass(frozen=True, eq=False)
+class Gimbal:
+    """Three rings: yaw about what is down, carried by pitch about what lies across the picture,
+    carried by roll about the line of sight. About the camera's own axes it is `turn_matrix`.
+    """
+
+    down: F64  # (3,) camera axes, unit
+    right: F64  # (3,) camera axes, unit, in the picture and across `down`
+
+    @staticmethod
+    def about(down: np.ndarray) -> Gimbal:
+        """The gimbal of what stands so; `down` (3,) camera axes, not 0."""
+        own = np.asarray(down, np.float64) / np.linalg.norm(down)
+        right = np.array([own[1], -own[0], 0.0])
+        size = float(np.linalg.norm(right))
+        return Gimbal(own, right / size if size > 1e-6 else np.array([1.0, 0.0, 0.0]))
+
+    def carried(self, pitch: float, roll: float) -> F64:
+        """The rotation (3, 3) of what carries the ring for yaw, degrees."""
+        tilted = matrix_from_vector(np.radians(pitch) * self.right)
+        return turn_matrix(0.0, 0.0, roll) @ tilted
+
+    def matrix(self, yaw: float, pitch: float, roll: float) -> F64:
+        """The rotation (3, 3) of these angles, degrees."""
+        return self.carried(pitch, roll) @ matrix_from_vector(np.radians(yaw) * self.down)
+
+    def turn(self, angles: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Yaw, pitch and roll about the camera's axes of a turn by the gimbal's own, degrees."""
+        return angles if self is CAMERA_GIMBAL else turn_of(self.matrix(*angles))
+
+    def of(self, turn: tuple[float, float, float]) -> tuple[float, float, float]:
+        """The gimbal's own angles of a turn about the camera's axes: the inverse."""
+        return turn if self is CAMERA_GIMBAL else self.angles(turn_matrix(*turn))
+
+    def angles(self, matrix: np.ndarray) -> tuple[float, float, float]:
+        """Yaw, pitch and roll, degrees in (-180, 180], of a rotation (3, 3): the inverse.
+
+        Of two answers it is the one that leans and rolls less.
+        """
+        away = np.cross([0.0, 0.0, 1.0], self.right)
+        lean = float(np.arctan2(self.down[2], self.down @ away))
+        there = np.asarray(matrix, np.float64) @ self.down
+        level = float(np.hypot(there[0], there[1]))
+        start = float(np.arctan2(away[1], away[0]))
+        found = []
+        for sign in (1.0, -1.0):
+            pitch = float(np.arctan2(there[2], sign * level)) - lean
+            roll = float(np.arctan2(sign * there[1], sign * there[0])) - start
+            roll = roll if level > 1e-9 else 0.0
+            found.append((_wrapped(np.degrees(pitch)), _wrapped(np.degrees(roll))))
+        pitch, roll = min(found, key=lambda pair: abs(pair[0]) + abs(pair[1]))
+        spun = self.carried(pitch, roll).T @ matrix
+        yaw = turn_about(vector_from_matrix(spun), self.down)
+        return _wrapped(np.degrees(yaw)), pitch, roll
+
+
+def _wrapped(degrees: float) -> float:
+    return float(180.0 - (180.0 - degrees) % 360.0)
+
+
+CAMERA_GIMBAL = Gimbal(np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]))

@@ -363,6 +363,16 @@ def set_grounded(document: Document, k: int, is_grounded: bool) -> Document:
     return document.with_object(k, replace(document.objects[k], is_grounded=is_grounded))
 
 
+def set_seen_from(document: Document, k: int, degrees: float | None) -> Document:
+    """Say from how many degrees above one looks down on object `k`; None: as it is seen to stand.
+
+    Raises EditError outside 0 to 90.
+    """
+    if degrees is not None and not 0 <= degrees <= 90:
+        raise EditError(f"one looks down on a thing by 0 to 90 degrees, not by {degrees:g}")
+    return document.with_object(k, replace(document.objects[k], seen_from=degrees))
+
+
 def set_deform(document: Document, k: int, settings: DeformSettings) -> Document:
     """Set how object `k` deforms; its pose, solved with the old settings, is dropped."""
     item = document.objects[k]

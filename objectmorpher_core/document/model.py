@@ -253,6 +253,8 @@ class LiftedObject:
     # x its size, how far its front is expected to be from where it was put; 0: nobody said
     doubt: float = 0.0
     stands: bool = False  # whether it was seen to stand on something
+    # Object frame, unit: what is up where it stands; None: its shape does not say
+    up: tuple[float, float, float] | None = None
     sides: Sides | None = None  # invented; None: what the photo does not show has plain colours
     origin: Origin | None = None  # None: the document's own photo
 
@@ -261,6 +263,8 @@ class LiftedObject:
             object.__setattr__(self, "middle", frozen(self.middle, np.float32))
         object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))
         object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
+        if self.up is not None and not abs(np.linalg.norm(self.up) - 1) < UNIT:
+            raise ValueError(f"what is up is {self.up}, not a direction of the length 1")
         if self.splatting not in SPLATTINGS:
             raise ValueError(f"splatting is {self.splatting!r}, not one of {', '.join(SPLATTINGS)}")
 
@@ -309,6 +313,7 @@ class LiftedObject:
 
 
 UNMOVED = frozen(np.eye(4))
+UNIT = 1e-6  # by which the length of a direction may differ from 1
 
 
 @dataclass(frozen=True)
@@ -410,6 +415,8 @@ class EditObject:
     keys: tuple[KeyPose, ...] = ()  # key poses of an animation, as many as the document has
     finish: Finish = AS_IN_THE_PHOTO
     is_locked: bool = False  # against changes by a slip
+    # Degrees above it, from which one looks down on it; None: as its shape or the horizon says
+    seen_from: float | None = None
 
     @property
     def found_matte(self) -> Matte | None:
@@ -417,6 +424,13 @@ class EditObject:
         if self.matte is None or self.contaminated is None:
             return self.matte
         return replace(self.matte, foreground=self.contaminated)
+
+    @property
+    def grounded_shadow(self) -> Shadow:
+        """Return its shadow on the ground that the artist says it stands on."""
+        if self.seen_from is None or self.shadow.ground is not None:
+            return self.shadow
+        return replace(self.shadow, ground=self.seen_from)
 
     @property
     def footing(self) -> Base:
@@ -553,7 +567,7 @@ class Plate:
 # Of an object, what its picture depends on; what else changes leaves a refinement as it is.
 SHOWN = (
     "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
-    "harmony", "relight", "grain", "defocus", "stays_in_front", "finish",
+    "harmony", "relight", "grain", "defocus", "stays_in_front", "finish", "seen_from",
 )  # fmt: skip
 
 

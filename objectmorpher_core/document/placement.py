@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base.arrays import F64
 from ..base.camera import Camera
-from ..base.rotations import turn_of
-from .model import LiftedObject, Placement
+from ..base.rotations import CAMERA_GIMBAL, Gimbal, turn_matrix, turn_of
+from .model import Document, EditObject, LiftedObject, Placement
 
 NEAREST = 0.02  # x its depth: an object that is held comes no nearer
 SKEW = 1e-3  # of a rotation that was rounded on its way
@@ -56,6 +56,50 @@ def placement_of(motion: np.ndarray, lifted: LiftedObject, camera: Camera) -> Pl
     return with_centre(Placement(turn=turn_of(rotation), scale=scale), centre, lifted, camera)
 
 
+def seen_from_above(camera: Camera, degrees: float, row: float) -> F64:
+    """(3,) world, unit: down, where one looks down by `degrees` on what is seen at `row` px."""
+    tilt = float(np.radians(degrees) - np.arctan2(row - camera.cy, camera.focal))
+    return np.array([0.0, np.cos(tilt), np.sin(tilt)])
+
+
+def down_at(
+    lifted: LiftedObject, camera: Camera, horizon: float | None, seen_from: float | None = None
+) -> F64 | None:
+    """(3,) world, unit: what is down where an object stands at rest; None: nothing says so.
+
+    `seen_from`: degrees above it, from which one is said to look; else its shape says how it
+    stands, else the photo's `horizon`, px of its row, where that is above it.
+    """
+    row = float(camera.project(lifted.centre)[1])
+    if seen_from is not None:
+        return seen_from_above(camera, seen_from, row)
+    if lifted.up is not None:
+        return -(lifted.world_from_object[:3, :3] @ np.array(lifted.up)) / lifted.scale
+    if horizon is not None and row > horizon:
+        normal = np.array([0.0, camera.focal, camera.cy - horizon])
+        return normal / np.linalg.norm(normal)
+    return None
+
+
+def gimbal_of(item: EditObject, document: Document) -> Gimbal:
+    """The axes about which an object is turned: about what is upright there, else the camera's.
+
+    What says nothing itself stands as another object of the photo does, else on the ground.
+    """
+    if item.lifted is None:
+        return CAMERA_GIMBAL
+    camera = document.photo.camera
+    others = document.objects if item.lifted.origin is None else ()
+    for own in (item, *others):
+        if own.lifted is not None and (own is item or own.lifted.origin is None):
+            down = down_at(own.lifted, camera, None, own.seen_from)
+            if down is not None:
+                return Gimbal.about(down)
+    down = down_at(item.lifted, camera, document.horizon)
+    return CAMERA_GIMBAL if down is None else Gimbal.about(down)
+
+
+SAME = 1e-12  # of cosines
 FOOT = 0.04  # x the object's height, from its lowest point: what touches the ground
 
 
@@ -76,19 +120,70 @@ def turned(
     """
     changed = replace(placement, turn=turn)
     before, after = placement.matrix(lifted, camera), changed.matrix(lifted, camera)
-    if turn[:2] == placement.turn[:2]:
+    both = turn_matrix(*turn) @ turn_matrix(*placement.turn).T
+    if both[2, 2] > 1 - SAME:  # it turns about the line of sight
         seen = [
             camera.project(points @ motion[:3, :3].T + motion[:3, 3]) for motion in (before, after)
         ]
         step = seen[0].mean(0) - seen[1].mean(0)
         move = placement.move[0] + float(step[0]), placement.move[1] + float(step[1])
         return replace(changed, move=move)
+    return _on_its_foot(placement, changed, points, lifted, camera, down)
+
+
+def scaled(
+    placement: Placement,
+    scale: float,
+    points: np.ndarray,
+    lifted: LiftedObject,
+    camera: Camera,
+    down: np.ndarray,
+) -> Placement:
+    """`placement` with another `scale`, about the foot of what stands, else about the centre.
+
+    The rest is as for `turned`.
+    """
+    changed = replace(placement, scale=scale)
+    return _on_its_foot(placement, changed, points, lifted, camera, down)
+
+
+def foot_of(
+    placement: Placement, points: np.ndarray, lifted: LiftedObject, camera: Camera, down: np.ndarray
+) -> F64:
+    """(3,) world: what stays where it is while an object turns or grows. `turned` has the rest."""
+    motion = placement.matrix(lifted, camera)
+    stays = _foot(points, down) if lifted.stands else lifted.centre
+    return motion[:3, :3] @ stays + motion[:3, 3]
+
+
+def _on_its_foot(
+    before: Placement,
+    changed: Placement,
+    points: np.ndarray,
+    lifted: LiftedObject,
+    camera: Camera,
+    down: np.ndarray,
+) -> Placement:
+    """`changed`, moved so that the foot of what stands is where it was `before`."""
     if not lifted.stands:
         return changed
-    foot = _foot(points, down)
-    stays = before[:3, :3] @ foot + before[:3, 3]
-    offset = after[:3, :3] @ (foot - lifted.centre)
+    stays = foot_of(before, points, lifted, camera, down)
+    offset = changed.matrix(lifted, camera)[:3, :3] @ (_foot(points, down) - lifted.centre)
     return with_centre(changed, stays - offset, lifted, camera)
+
+
+def spun(placement: Placement, degrees: float, item: EditObject, document: Document) -> Placement:
+    """`placement`, before which the object turns where it stands, about its own upright axis.
+
+    A positive angle turns its front to the left. What stands keeps its foot where it is; what
+    flies turns about its centre. Raises ValueError behind the camera.
+    """
+    assert item.lifted is not None, "only a lifted object can be turned"
+    lifted, camera = item.lifted, document.photo.camera
+    gimbal = gimbal_of(item, document)
+    matrix = turn_matrix(*placement.turn) @ gimbal.matrix(degrees, 0.0, 0.0)
+    points = lifted.world_points(lifted.body.means)
+    return turned(placement, turn_of(matrix), points, lifted, camera, gimbal.down)
 
 
 def _foot(points: np.ndarray, down: np.ndarray) -> F64:

@@ -21,12 +21,22 @@ from ..base.arrays import F32, RGB, U8, Mask
 from ..base.camera import Camera
 from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
-from ..base.rotations import matrix_from_vector, vector_from_matrix
+from ..base.rotations import Gimbal, matrix_from_vector, vector_from_matrix
 from ..compose.composite import composite
 from ..deform.puppet import Puppet, puppet_of
 from ..document.key_edits import at_key, count_keys
-from ..document.model import Document, EditObject, Handle, Matte, Photo, Placement, Plate, Pose
+from ..document.model import (
+    Document,
+    EditObject,
+    Handle,
+    Matte,
+    Photo,
+    Placement,
+    Plate,
+    Pose,
+)
 from ..document.paint import Paint
+from ..document.placement import gimbal_of
 from ..pictures.image import to_u8
 
 Box = tuple[int, int, int, int]
@@ -286,13 +296,18 @@ class _Film:
     def turned(self, k: int, yaw: float) -> Document:
         """The document with object `k` turned about its own upright axis, degrees."""
         item = self._document.objects[k]
-        old = item.placement.turn
-        placement = replace(item.placement, turn=(old[0] + yaw, old[1], old[2]))
+        gimbal = self._gimbal(item)
+        old = gimbal.of(item.placement.turn)
+        turn = gimbal.turn((old[0] + yaw, old[1], old[2]))
+        placement = replace(item.placement, turn=turn)
         return self._document.with_object(k, replace(item, placement=placement, is_visible=True))
+
+    def _gimbal(self, item: EditObject) -> Gimbal:
+        return gimbal_of(item, self._document)
 
     def _between(self, k: int, start: EditObject, end: EditObject, share: float) -> EditObject:
         """Object `k` when a `share` of the way from one of its states to another is done."""
-        placement = _blended(start.placement, end.placement, share)
+        placement = _blended(start.placement, end.placement, share, self._gimbal(end))
         if share <= 0 or (start.pose is None and end.pose is None):
             return replace(end, pose=start.pose, placement=placement)
         if share >= 1:
@@ -346,15 +361,15 @@ def _summed(start: Any, end: Any, share: float) -> Any:
     return (1 - share) * start if end is None else start + share * (end - start)
 
 
-def _blended(start: Placement, end: Placement, share: float) -> Placement:
+def _blended(start: Placement, end: Placement, share: float, gimbal: Gimbal) -> Placement:
     def mean(a: float, b: float) -> float:
         return a + share * (b - a)
 
     (x0, y0), (x1, y1) = start.move, end.move
-    yaw, pitch, roll = map(mean, start.turn, end.turn)
+    yaw, pitch, roll = map(mean, gimbal.of(start.turn), gimbal.of(end.turn))
     scale = start.scale ** (1 - share) * end.scale**share
     return Placement((mean(x0, x1), mean(y0, y1)), mean(start.depth, end.depth),
-                     (yaw, pitch, roll), scale)  # fmt: skip
+                     gimbal.turn((yaw, pitch, roll)), scale)  # fmt: skip
 
 
 def _mixed(puppet: Puppet, start: Pose | None, end: Pose | None, share: float) -> Pose:

@@ -379,6 +379,14 @@ class EditScript:
         None, _list(1, 3), _PLACED, "YAW[,PITCH,ROLL]",
         "degrees; a positive yaw turns its front to the left",
     )  # fmt: skip
+    spin: float = _option(
+        0.0, NUMBER, _PLACED, "DEGREES",
+        "turn it where it stands, about its own upright axis, before --turn",
+    )  # fmt: skip
+    seen_from: float | None = _option(
+        None, _range(0.0, 90.0), (OTHER, PLACING), "DEGREES",
+        "how steeply you look down on it: 0 from its side, 90 from above",
+    )  # fmt: skip
     scale: float | None = _option(None, NUMBER, _PLACED, "S", "scale factor")
     key: tuple[EditScript, ...] = _option(
         (), KEYS, _WHOLE, "POSE",

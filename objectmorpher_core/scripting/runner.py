@@ -34,6 +34,7 @@ from ..document.model import (
     Placement,
     Prompt,
 )
+from ..document.placement import spun
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
@@ -158,7 +159,7 @@ def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
         asked.turn if "turn" in said else place.turn,
         asked.scale if "scale" in said else place.scale,
     )
-    document = edits.set_placement(document, k, place)
+    document = edits.set_placement(document, k, _spun(document, k, place, script))
     document = edits.set_visible(document, k, True)
     document = finished(document, k, script, said)
     if script.shadow == "none":
@@ -205,7 +206,10 @@ def key_poses(document: Document, k: int, puppet: Puppet, script: EditScript) ->
 
 def placed(document: Document, k: int, script: EditScript) -> Document:
     """Object `k` where the script wants it, or gone."""
-    document = edits.set_placement(document, k, _placement(script))
+    if script.seen_from is not None:
+        document = edits.set_seen_from(document, k, script.seen_from)
+    placement = _spun(document, k, _placement(script), script)
+    document = edits.set_placement(document, k, placement)
     return edits.set_visible(document, k, False) if script.remove else document
 
 
@@ -233,9 +237,18 @@ def finished(
 
 
 def _placement(script: EditScript) -> Placement:
+    """Where the script wants an object, but for its spin."""
     move, turn = script.move or (0.0, 0.0, 0.0), script.turn or (0.0, 0.0, 0.0)
     scale = 1.0 if script.scale is None else script.scale
     return Placement((move[0], move[1]), move[2], turn, scale)
+
+
+def _spun(document: Document, k: int, placement: Placement, script: EditScript) -> Placement:
+    """`placement` of object `k` with the script's spin before it."""
+    item = document.objects[k]
+    if not script.spin or item.lifted is None:
+        return placement
+    return spun(placement, script.spin, item, document)
 
 
 def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript) -> Document:

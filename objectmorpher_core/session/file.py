@@ -311,6 +311,8 @@ def _check(document: Document) -> None:
             _near("matte", item.matte.box, _size_around(item, (width, height)))
         _check_paint(item)
         _check_lifted(item)
+        if item.seen_from is not None and not 0 <= item.seen_from <= 90:
+            raise ValueError(f"an object is seen from {item.seen_from:g} degrees above")
     if document.horizon is not None and abs(document.horizon) > MAX_HORIZON * height:
         raise ValueError(f"a horizon at {document.horizon:g} px is far outside the photo")
     if (depth := document.depth) is not None and (depth.ndim != 2 or not depth.size):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ from objectmorpher_core.document.key_edits import (
     replace_key,
 )
 from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.placement import spun
 from objectmorpher_core.document.pose import Pose
 from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
 from objectmorpher_core.pipeline import run_script
@@ -70,13 +72,31 @@ def test_the_share_is_still_at_both_ends():
     assert max(abs(a - b) for a, b in zip(shares, [*shares[1:], shares[0]], strict=True)) < 0.06
 
 
+@pytest.mark.parametrize("up", [None, (0.0, -0.6, -0.8)])
 @pytest.mark.parametrize("motion", ["sway", "turn"])
-def test_an_object_turns_without_a_jump(motion):
+def test_an_object_turns_without_a_jump(motion, up):
     document = shapes.scene("ellipse").document()
+    thing = document.objects[0]
+    lifted = replace(shapes.scene("ellipse").lifted, up=up)
+    document = document.with_object(0, replace(thing, lifted=lifted))
     found = list(frames(document, Clip(motion, seconds=1.0, rate=24)))
     assert np.array_equal(found[0], document.photo.pixels)
     gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
     assert 0 < max(gaps) < 6 * np.median(gaps) + 1
+
+
+def test_between_photo_and_edit_a_thing_that_is_spun_stands():
+    """Half of a spin about its own upright is a spin by half the angle."""
+    scene = shapes.scene("ellipse")
+    lifted, document = replace(scene.lifted, up=(0.0, -0.6, -0.8)), scene.document()
+    document = document.with_object(0, replace(document.objects[0], lifted=lifted))
+    whole, half = (
+        edits.set_placement(document, 0, spun(Placement(), degrees, document.objects[0], document))
+        for degrees in (40.0, 40.0 * share_at(0.25))
+    )
+    found = next(islice(frames(whole, Clip("morph", seconds=1.0, rate=8)), 2, None))
+    assert difference(found, composite(half, {0: scene.puppet}).pixels) < 0.5
+    assert difference(found, document.photo.pixels) > 2.0
 
 
 def test_nothing_to_be_seen_is_said_in_a_sentence():

@@ -8,13 +8,23 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.rotations import turn_matrix, turn_of
+from objectmorpher_core.base.rotations import (
+    CAMERA_GIMBAL,
+    turn_about,
+    turn_matrix,
+    turn_of,
+    vector_from_matrix,
+)
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.document.placement import (
     GroundError,
     HeldPoint,
     centre_of,
+    foot_of,
+    gimbal_of,
     ground_under,
+    scaled,
+    spun,
     turned,
     with_centre,
 )
@@ -182,3 +192,57 @@ def test_a_roll_keeps_the_middle_of_the_outline(scene):
     about_centre = middle(replace(start, turn=rolled)) - middle(start)
     assert np.linalg.norm(about_centre) > 0.5
     assert np.linalg.norm(middle(kept) - middle(start)) < 0.1 * np.linalg.norm(about_centre)
+
+
+UPS = [(0.0, -1.0, 0.0), (0.1, -0.6, -float(np.sqrt(1 - 0.37)))]
+
+
+@over("up", UPS)
+@over("degrees", [25.0, -35.0, 170.0])
+@over("turn", [(0.0, 0.0, 0.0), (12.0, -8.0, 30.0)])
+def test_a_spin_turns_what_stands_on_its_foot_about_its_upright(scene, up, degrees, turn):
+    document = scene.document()
+    lifted = replace(scene.lifted, up=up, stands=True)
+    thing = replace(document.objects[0], lifted=lifted)
+    start = Placement((4.0, -3.0), 0.2, turn, 1.2)
+    before = start.matrix(lifted, scene.camera)
+    after = spun(start, degrees, thing, document).matrix(lifted, scene.camera)
+    points, down = _points(scene), -np.array(up)
+    depth = points @ down
+    own = points[depth > depth.max() - 0.04 * np.ptp(depth)]
+    foot = 0.5 * (own.min(0) + own.max(0))
+    np.testing.assert_allclose(*([*m[:3] @ [*foot, 1.0]] for m in (before, after)), atol=EXACT)
+    np.testing.assert_allclose(after[:3, :3] @ down, before[:3, :3] @ down, atol=EXACT)
+    spin = np.linalg.inv(before[:3, :3]) @ after[:3, :3]
+    assert np.degrees(turn_about(vector_from_matrix(spin), down)) == pytest.approx(degrees)
+
+
+def test_a_thing_stands_as_told_as_its_shape_says_as_its_neighbour_does_or_by_the_horizon(scene):
+    document = scene.document()
+    thing = document.objects[0]
+    assert gimbal_of(thing, document) is CAMERA_GIMBAL
+    document = replace(document, horizon=20.0)
+    ground = ground_under(_points(scene), scene.camera, 20.0)
+    np.testing.assert_allclose(gimbal_of(thing, document).down, ground.normal)
+    plate = replace(thing, lifted=replace(scene.lifted, up=UPS[1]))
+    document = replace(document, objects=(thing, plate))
+    for own in (thing, plate):
+        np.testing.assert_allclose(gimbal_of(own, document).down, -np.array(UPS[1]))
+    told = gimbal_of(replace(plate, seen_from=30.0), document).down
+    way = scene.lifted.centre / np.linalg.norm(scene.lifted.centre)
+    assert np.degrees(np.arcsin(told @ way)) == pytest.approx(30.0, abs=1.0)
+
+
+@over("stands", [True, False])
+@over("up", UPS)
+def test_what_stands_grows_from_its_foot_and_all_else_from_its_centre(scene, up, stands):
+    lifted, points = replace(scene.lifted, up=up, stands=stands), _points(scene)
+    start = Placement((4.0, -3.0), 0.2, (12.0, -8.0, 30.0), 1.2)
+    standing = (points, lifted, scene.camera, -np.array(up))
+    larger = scaled(start, 1.9, *standing)
+    assert (larger.turn, larger.scale) == (start.turn, 1.9)
+    feet = [foot_of(own, *standing) for own in (start, larger)]
+    np.testing.assert_allclose(*feet, atol=EXACT)
+    if not stands:
+        np.testing.assert_allclose(feet[0], centre_of(start, lifted, scene.camera), atol=EXACT)
+        assert larger == replace(start, scale=1.9)

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.rotations import (
+    CAMERA_GIMBAL,
+    Gimbal,
     matrices_from_quats,
     matrix_from_vector,
     quats_from_matrices,
     turn_about,
     turn_matrix,
+    turn_of,
     turned_by,
     vector_from_matrix,
 )
@@ -103,3 +106,30 @@ def test_many_small_turns_add_up_to_more_than_a_whole_one():
     for _ in range(100):
         vector = turned_by(vector, np.array([0.0, 0.0, 0.1]))
     np.testing.assert_allclose(vector, [0, 0, 10.0], atol=1e-9)
+
+
+def test_a_gimbal_finds_the_angles_of_every_rotation():
+    rng = np.random.default_rng(3)
+    for down, vector in rng.normal(size=(200, 2, 3)):
+        gimbal, matrix = Gimbal.about(down), matrix_from_vector(2 * vector)
+        np.testing.assert_allclose(gimbal.matrix(*gimbal.angles(matrix)), matrix, atol=1e-9)
+        turn = turn_of(matrix)
+        np.testing.assert_allclose(gimbal.turn(gimbal.of(turn)), turn, atol=1e-6)
+
+
+def test_yaw_alone_leaves_a_thing_standing_and_comes_back_as_it_was_put():
+    """The inverse finds few degrees of pitch and roll as they are, about any upright."""
+    rng = np.random.default_rng(4)
+    for down in [[0, 0, 1.0], [0, 1.0, 0], *rng.normal(size=(50, 3))]:
+        gimbal = Gimbal.about(np.array(down))
+        yaw, pitch, roll = rng.uniform(-179, 179), *rng.uniform(-20, 20, 2)
+        np.testing.assert_allclose(gimbal.matrix(yaw, 0, 0) @ gimbal.down, gimbal.down, atol=1e-9)
+        if abs(gimbal.down[2]) < 0.99:  # seen from right above, yaw and roll are the same
+            found = gimbal.angles(gimbal.matrix(yaw, pitch, roll))
+            np.testing.assert_allclose(found, [yaw, pitch, roll], atol=1e-6)
+
+
+def test_the_camera_s_gimbal_turns_as_the_command_line_does():
+    for turn in np.random.default_rng(5).uniform(-80, 80, (50, 3)):
+        np.testing.assert_allclose(CAMERA_GIMBAL.matrix(*turn), turn_matrix(*turn), atol=1e-12)
+        np.testing.assert_allclose(CAMERA_GIMBAL.angles(turn_matrix(*turn)), turn, atol=1e-9)

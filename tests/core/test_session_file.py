@@ -55,7 +55,7 @@ def lifted_object(random: np.random.Generator) -> LiftedObject:
     )
     return LiftedObject(
         gaussians, texture, random.normal(size=(NODES, 3)), random.normal(size=(4, 4)),
-        float(np.float64(1) / 3), "relief", "mip",
+        float(np.float64(1) / 3), "relief", "mip", up=(0.0, -0.6, -0.8),
     )  # fmt: skip
 
 

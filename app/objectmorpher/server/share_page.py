@@ -25,6 +25,7 @@ from objectmorpher_core.compose.plate.plate import plate_picture
 from objectmorpher_core.deform.puppet import Puppet, puppet_of
 from objectmorpher_core.deform.resampling import thinned
 from objectmorpher_core.document.model import Document, LiftedObject
+from objectmorpher_core.document.placement import gimbal_of
 from objectmorpher_core.pictures.image import (
     Picture,
     encode_coverage,
@@ -147,6 +148,7 @@ def _places(document: Document, index: int, puppet: Puppet, scale: float) -> dic
     assert matte is not None
     now = item.placement.matrix(lifted, camera) @ lifted.world_from_object
     rest = lifted.world_from_object
+    down = gimbal_of(item, document).down
     left, top, right, bottom = (side * scale for side in matte.box)
     return {
         "camera": [camera.focal * scale, camera.cx * scale, camera.cy * scale],
@@ -155,6 +157,7 @@ def _places(document: Document, index: int, puppet: Puppet, scale: float) -> dic
         "turn": now[:3, :3].ravel().tolist(), "shift": now[:3, 3].tolist(),
         "rest_turn": rest[:3, :3].ravel().tolist(), "rest_shift": rest[:3, 3].tolist(),
         "middle": lifted.object_points(lifted.centre).tolist(), "depth": float(lifted.centre[2]),
+        "down": (rest[:3, :3].T @ down).tolist(),  # object frame, of any length
         "gap": SURFACE_GAP * lifted.spacing * lifted.scale,
         "extent": lifted.diameter * lifted.scale,
         "is_surface": int(kind.is_surface), "is_edged": int(kind.is_edged),

@@ -1,9 +1,9 @@
 """The grips of the whole object as the photo's own camera sees them; canvas px.
 
-Three rings turn it about the axes of `Placement.turn`, R = Rz(roll) Rx(pitch) Ry(yaw): like the
-rings of a gimbal, the one for yaw is carried by pitch and roll, the one for pitch by roll. Each
-lies in the plane across its axis, around the object's centre. A point of it that is dragged along
-it by an angle turns the object by that angle, and changes one number.
+Three rings turn it about the axes of its gimbal, R = Rz(roll) R(pitch) R(yaw): the one for yaw,
+about what is upright in the photo as far as that is known, is carried by pitch and roll, the one
+for pitch by roll. Each lies in the plane across its axis, around the object's centre. A point of
+it that is dragged along it by an angle turns the object by that angle, and changes one number.
 
 The arrow is parallel to the ray to the object's centre. The picture of such a line runs towards
 the picture of the centre: a point at depth z is seen f r / z px from it.
@@ -18,7 +18,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.rotations import turn_matrix
+from objectmorpher_core.base.rotations import Gimbal
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
@@ -193,7 +193,7 @@ def gizmo(editor: Editor) -> Gizmo | None:
         centre,
         OUTERMOST * world * zoom,
         hole,
-        rings(middle, thing.placement.turn, world, camera),
+        rings(middle, editor.placing.gimbal, editor.placing.angles, world, camera),
         Arrow(centre, side, near, far),
         None if row is None else float(view.canvas_from_image(np.array([0.0, row]))[1]),
     )
@@ -208,15 +208,20 @@ def _kept_off(corners: F64, least: float) -> F64:
 
 
 def rings(
-    centre: np.ndarray, turn: tuple[float, float, float], radius: float, camera: Camera
+    centre: np.ndarray,
+    gimbal: Gimbal,
+    angles: tuple[float, float, float],
+    radius: float,
+    camera: Camera,
 ) -> dict[str, Ring]:
-    """The rings around `centre` (3,) at a turn; `radius` world units, of the inner two."""
-    _, pitch, roll = turn
-    tilted, rolled, outer = turn_matrix(0, pitch, roll), turn_matrix(0, 0, roll), OUTERMOST * radius
+    """The rings around `centre` (3,) at angles; `radius` world units, of the inner two."""
+    _, pitch, roll = angles
+    tilted, rolled, outer = gimbal.carried(pitch, roll), gimbal.carried(0, roll), OUTERMOST * radius
     x, y, z = np.eye(3)
+    across, away = gimbal.right, np.cross(gimbal.right, gimbal.down)
     return {
         # Each pair, in this order, turns about its axis by the right hand: z x about y, y z about x
-        "yaw": Ring(centre, radius * tilted @ z, radius * tilted @ x, camera),
-        "pitch": Ring(centre, radius * rolled @ y, radius * rolled @ z, camera),
+        "yaw": Ring(centre, radius * tilted @ away, radius * tilted @ across, camera),
+        "pitch": Ring(centre, radius * rolled @ np.cross(z, across), radius * rolled @ z, camera),
         "roll": Ring(centre, outer * x, outer * y, camera, has_back=False),
     }

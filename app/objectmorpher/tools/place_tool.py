@@ -172,17 +172,18 @@ def _depth(editor: Editor, first: Pointer) -> Change:
 
 
 def _scale(editor: Editor, first: Pointer) -> Change:
-    """By how much farther from the centre the corner was pulled."""
-    shown, start = gizmo(editor), editor.placing.placement
-    assert shown is not None and start is not None
-    reach = max(float(np.linalg.norm(first.xy - shown.centre)), 1.0)
+    """By how much farther from what stays the corner was pulled: its foot, or its centre."""
+    start, document = editor.placing.placement, editor.document
+    assert start is not None and document is not None
+    stays = editor.view.canvas_from_image(document.photo.camera.project(editor.placing.pivot()))
+    reach = max(float(np.linalg.norm(first.xy - stays)), 1.0)
 
     def change(now: Pointer, away: float) -> Placement:
-        scale = start.scale * float(np.linalg.norm(now.xy - shown.centre)) / reach
+        scale = start.scale * float(np.linalg.norm(now.xy - stays)) / reach
         if now.shift:
             scale = round(scale / SCALE_SNAP) * SCALE_SNAP
         scale = float(np.clip(scale, MIN_SCALE, MAX_SCALE))
-        return editor.placing.stood(replace(start, scale=scale, depth=start.depth + away))
+        return editor.placing.scaled(replace(start, depth=start.depth + away), scale)
 
     return change
 
@@ -195,16 +196,16 @@ def _along(part: str) -> Callable[[Editor, Pointer], Change]:
         shown, start = gizmo(editor), editor.placing.placement
         assert shown is not None and start is not None
         ring = shown.rings[part]
-        went = _went(ring, first.xy)
+        went, before = _went(ring, first.xy), editor.placing.angles
 
         def change(now: Pointer, away: float) -> Placement:
-            turn = list(start.turn)
+            turn = list(before)
             turn[axis] += float(np.degrees(went(now.xy)))
             if now.shift:
                 turn[axis] = round(turn[axis] / SNAP) * SNAP
             turn[axis] = wrapped(turn[axis])
             farther = replace(start, depth=start.depth + away)
-            return editor.placing.turned(farther, (turn[0], turn[1], turn[2]))
+            return editor.placing.turned_to(farther, (turn[0], turn[1], turn[2]))
 
         return change
 
@@ -282,14 +283,13 @@ def _ball(editor: Editor, first: Pointer) -> Change:
 
 def _turn(editor: Editor, first: Pointer) -> Change:
     """What faces the camera follows the pointer: to the right is a negative yaw (DESIGN 6)."""
-    start = editor.placing.placement
+    start, (yaw, pitch, roll) = editor.placing.placement, editor.placing.angles
     assert start is not None
 
     def change(now: Pointer, away: float) -> Placement:
         delta = one_axis((now.xy - first.xy) / editor.view.scale * TURN_SPEED, now)
-        yaw, pitch, roll = start.turn
         turn = (wrapped(yaw - delta[0]), wrapped(pitch + delta[1]), roll)
-        return editor.placing.turned(replace(start, depth=start.depth + away), turn)
+        return editor.placing.turned_to(replace(start, depth=start.depth + away), turn)
 
     return change
 

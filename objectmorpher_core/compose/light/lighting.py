@@ -18,6 +18,7 @@ from ...base.arrays import F32, F64
 from ...base.camera import Camera
 from ...document.bounds import NORMAL
 from ...document.model import Document, EditObject, LiftedObject, Matte
+from ...document.placement import down_at
 from ...document.settings import AS_IN_THE_PHOTO, Shadow
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, build_levels
@@ -200,7 +201,7 @@ class Lighting:
             return None
         camera = self._document.photo.camera
         most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
-        standing = stand(splats, camera, horizon, item.shadow, most)
+        standing = stand(splats, camera, horizon, item.grounded_shadow, most)
         if standing is None:
             return None
         return Caster(item.shadow, standing, horizon, cells, self._depth)
@@ -227,7 +228,7 @@ class Lighting:
     ) -> float:
         """Px by which the object is too sharp for where it is now."""
         assert item.lifted is not None and item.matte is not None
-        camera, shadow = self._document.photo.camera, item.shadow
+        camera, shadow = self._document.photo.camera, item.grounded_shadow
         normal = _normal_under(item.lifted, camera, horizon, shadow)
         ground = StandingPlane(normal, horizon is not None or shadow.ground is not None)
         return find_defocus(splats, rest, item.matte, ground, self.focus, camera)
@@ -275,7 +276,9 @@ def _normal_under(
 ) -> F64:
     """(3,) of the ground where the object was at rest: it stays where it is."""
     row = float(camera.project(lifted.centre)[1])
-    return ground_normal(camera, horizon, shadow, row)
+    if shadow.ground is None and (down := down_at(lifted, camera, horizon)) is not None:
+        return down
+    return ground_normal(camera, None, shadow, row)
 
 
 # Where the light on an object comes from, told from the photo without any weights.

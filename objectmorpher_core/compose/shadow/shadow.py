@@ -23,6 +23,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64
 from ...base.camera import Camera
+from ...document.placement import seen_from_above
 from ...document.settings import Shadow
 from ..blend import Box
 from ..silhouette import SilhouetteGrid, box_around, sampled
@@ -74,13 +75,11 @@ def ground_normal(camera: Camera, horizon: float | None, shadow: Shadow, row: fl
 
     `horizon`: the row of the photo it lies in, px. What the shadow says of the ground counts more.
     """
-    below = float(np.arctan2(row - camera.cy, camera.focal))  # radians, of the ray to it
     if shadow.ground is None and horizon is not None and row > horizon:
         tilt = float(np.arctan2(camera.cy - horizon, camera.focal))
-    else:
-        seen_from = USUAL_GROUND if shadow.ground is None else shadow.ground
-        tilt = float(np.radians(seen_from)) - below
-    return np.array([0.0, np.cos(tilt), np.sin(tilt)])
+        return np.array([0.0, np.cos(tilt), np.sin(tilt)])
+    seen_from = USUAL_GROUND if shadow.ground is None else shadow.ground
+    return seen_from_above(camera, seen_from, row)
 
 
 @dataclass(frozen=True, eq=False)

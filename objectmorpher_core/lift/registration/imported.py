@@ -344,7 +344,7 @@ def _lifted(
     except ValueError as error:
         raise LiftError(str(error)) from error
     return LiftedObject(
-        gaussians, texture, points, world_from_object, spacing, "imported", splatting
+        gaussians, texture, points, world_from_object, spacing, "imported", splatting, up=UP
     )
 
 
@@ -375,5 +375,5 @@ def _assembled(
     )
     return LiftedObject(
         gaussians, texture, plain.control_points, plain.world_from_object, plain.spacing,
-        plain.backend, plain.splatting,
+        plain.backend, plain.splatting, up=plain.up,
     )  # fmt: skip

@@ -39,6 +39,7 @@ class ReliefBody:
     kind: str = "free"  # what it was recognised as: see `shapes`
     lacks: F64 = field(default_factory=lambda: np.zeros(2))  # slope: see `lean`
     doubt: float = 0.0  # x extent, expected error of the front's depth; 0: nobody said
+    up: F64 | None = None  # (3,) camera axes, unit: what is up where it stands; None: not seen
 
     @staticmethod
     def of(
@@ -63,7 +64,8 @@ class ReliefBody:
             halves = camera.focal * far * (1 - 1 / _nearer(standing.prism, xy))
             share = _share(standing.prism, xy, silhouette.extent)
             sides = [inflated.mixed(settings.thickness * half, share) for half in halves]
-        return ReliefBody(silhouette, standing, middle, sides[0], sides[1])
+        up = None if standing.prism is None else standing.prism.plan.up
+        return ReliefBody(silhouette, standing, middle, sides[0], sides[1], up=up)
 
     def nearer(self, height: F64) -> ReliefBody:
         """Return the body with its parts moved towards the camera by `height` (h, w) px."""

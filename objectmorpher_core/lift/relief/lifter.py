@@ -309,8 +309,9 @@ def _assemble(
         "relief",
         middle=middle,
         kind=body.kind,
-        stands=body.standing.is_known,
+        stands=body.standing.is_known or body.up is not None,
         doubt=body.doubt,
+        up=None if body.up is None else (float(body.up[0]), float(body.up[1]), float(body.up[2])),
     )  # fmt: skip
 
 

@@ -223,6 +223,12 @@ class GroundPlane:
         length = float(np.hypot(self.camera.focal, rise))
         return self.camera.focal / length, rise / length
 
+    @property
+    def up(self) -> F64:
+        """(3,) camera axes, unit: the ground's normal."""
+        cosine, sine = self.down
+        return np.array([0.0, -cosine, -sine])
+
     def is_seen(self, y: F64) -> bool:
         """Return whether the ground in rows `y` (n,) px is far enough below the horizon."""
         return bool(y.min() - self.horizon >= LEAST_BELOW * self.camera.height)

@@ -49,6 +49,7 @@ def completed(
     sides = [side.towards(thickness * half, share) for side in (body.front, body.back)]
     middle = body.middle + share * (near - half - body.middle)
     body = replace(body, middle=middle, front=sides[0], back=sides[1], kind=shape.kind)
+    body = replace(body, up=body.up if shape.up is None else shape.up)
     return _whole(body, share)
 
 

@@ -16,6 +16,7 @@ class Mesh(NamedTuple):
 
     vertices: F64  # (V, 3)
     faces: I64  # (F, 3), outward by the right-hand rule seen from outside with y down
+    axes: F64 = np.zeros((0, 3))  # (k, 3) unit, about which it is alike: it may stand along one
 
 
 @dataclass(frozen=True)

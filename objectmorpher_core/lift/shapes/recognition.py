@@ -39,6 +39,7 @@ FLATNESS = (-2.71, -3.25, -12.6)
 RECTANGLE = 1.5  # log odds, of an outline that is one in perspective
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
 EXPLAINED = 0.95  # weight, from which no other shape is tried
+STANDS, LYING = 0.5, 0.5  # weight of a shape that tells what is up, and cosine to the upright
 LEAST_SURE = 20  # cells, from which anything is recognised
 SECOND = 0.1  # x what is seen of a box, of its second side
 
@@ -54,6 +55,18 @@ class Recognised:
     mesh: Mesh | None = None
     plane: F64 | None = None  # (3,) of a sheet: see `flats`
     description: float = 0.0  # length, of a solid
+
+    @property
+    def up(self) -> F64 | None:
+        """(3,) camera axes, unit: the axis along which it stands; None where it has none.
+
+        Of a box it is the one that is nearest to the picture's upright.
+        """
+        if self.mesh is None or not len(self.mesh.axes) or self.weight < STANDS:
+            return None
+        up = self.mesh.axes[int(np.abs(self.mesh.axes[:, 1]).argmax())]
+        up = -np.sign(up[1]) * up
+        return up if -up[1] > LYING else None
 
     def over(self, outline: ReliefSilhouette, camera: Camera) -> PlacedShape:
         """The shape on the cells of a silhouette."""

@@ -25,6 +25,7 @@ LEAST_ARC = 0.5  # x the outline, that lies on the first ellipse
 LEAST_FURTHER = 0.1  # x the outline, that lies on a further one
 HELD = 0.97  # x an ellipse's area, that is within the mask
 SEEN_LEAN = 0.35  # x a rim's own slope, that the network sees of it
+HANGING = 0.2  # cosine of a rim's normal to the picture's upright, below which it does not lie
 LEVEL = 0.25  # slope, below which a rim may as well face the camera
 SIZE = 100  # px, a lip's radius in the picture in which it is looked for
 # How far off it may be, x its radius, how much wider and how much more tilted.
@@ -59,6 +60,11 @@ class Rim:
         places = np.concatenate([tangents, np.ones((*tangents.shape[:-1], 1))], -1)
         away = np.linalg.norm(places * depth[..., None] - self.centre, axis=-1)
         return (away - self.radius) / self.centre[2]
+
+    @property
+    def up(self) -> F64 | None:
+        """(3,) what is up where it lies; None for one that hangs, or is seen from below."""
+        return self.normal if self.normal[1] < -HANGING else None
 
     @property
     def is_steep(self) -> bool:

@@ -16,7 +16,7 @@ RINGS = 14  # of a ball; of one that is shown so many times more as it has corne
 
 def box(centre: F64, axes: F64, half: F64) -> Mesh:
     """About `centre` (3,), `half` (3,) as long along the rows of `axes` (3, 3), unit."""
-    return Mesh(centre + (_CORNERS * half) @ axes, _SIDES)
+    return Mesh(centre + (_CORNERS * half) @ axes, _SIDES, axes)
 
 
 def ellipsoid(centre: F64, columns: F64, around: int = AROUND) -> Mesh:
@@ -35,7 +35,7 @@ def revolved(places: F64, radii: F64, axis: F64, around: int = AROUND) -> Mesh:
     ways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * over
     rings = places[:, None] + radii[:, None, None] * ways
     vertices = np.concatenate([rings.reshape(-1, 3), places[[0, -1]]])
-    return Mesh(np.asarray(vertices, np.float64), _rings(len(places), around))
+    return Mesh(np.asarray(vertices, np.float64), _rings(len(places), around), axis[None])
 
 
 def tube(centre: F64, axis: F64, sizes: F64, around: int = AROUND) -> Mesh:
@@ -54,7 +54,7 @@ def tube(centre: F64, axis: F64, sizes: F64, around: int = AROUND) -> Mesh:
     after, beside = ((k + 1) % around) * count, (m + 1) % count
     a, b, c, d = k * count + m, after + m, after + beside, k * count + beside
     faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
-    return Mesh(centre + vertices.reshape(-1, 3), faces.astype(np.int64))
+    return Mesh(centre + vertices.reshape(-1, 3), faces.astype(np.int64), axis[None])
 
 
 def sheet(corner_rays: F64, inverse: F64, share: float) -> Mesh:

@@ -52,6 +52,7 @@ def laid(
     How far away the whole is, the body decides.
     """
     stack = None
+    body = replace(body, up=rims[0].up)
     if len(rims) > 1:
         rims = [rims[0], at_edge(rims[0], rims[1], subject.pixels, subject.mask, subject.camera)]
         stack = Stack.of(body, rims, seen, subject)

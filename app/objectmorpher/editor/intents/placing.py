@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.model import EditObject, LiftedObject, Placement
 from objectmorpher_core.document.placement import (
     Ground,
-    GroundError,
     HeldPoint,
     centre_of,
-    ground_under,
+    foot_of,
+    gimbal_of,
+    scaled,
     turned,
     with_centre,
 )
@@ -46,6 +49,48 @@ class Placing:
         if editor.document is None or not editor.is_lifted:
             return None
         return editor.derived.frame(editor.document, editor.current)
+
+    @property
+    def gimbal(self) -> Gimbal:
+        """The axes about which the current object turns; the camera's where nothing is lifted."""
+        document, thing = self._editor.document, self._editor.object
+        if document is None or thing is None:
+            return CAMERA_GIMBAL
+        return gimbal_of(thing, document)
+
+    @property
+    def seen_from(self) -> float:
+        """From how many degrees above one looks down on the current object, at rest."""
+        return self._looking_down(self._editor.object)
+
+    @property
+    def usual_seen_from(self) -> float:
+        """The same, as it is seen to stand."""
+        thing = self._editor.object
+        return self._looking_down(thing and replace(thing, seen_from=None))
+
+    def _looking_down(self, thing: EditObject | None) -> float:
+        document = self._editor.document
+        assert document is not None and thing is not None and thing.lifted is not None
+        down = gimbal_of(thing, document).down
+        way = thing.lifted.centre / np.linalg.norm(thing.lifted.centre)
+        return float(np.degrees(np.arcsin(np.clip(way @ down, 0.0, 1.0))))
+
+    def look_down(self, degrees: float | None) -> None:
+        """Previews the current object as seen from so many degrees above; None: as it stands."""
+        editor = self._editor
+        if editor.committed is not None and editor.is_lifted:
+            editor.preview = edits.set_seen_from(editor.committed, editor.current, degrees)
+
+    @property
+    def angles(self) -> tuple[float, float, float]:
+        """Yaw, pitch and roll of the current object, degrees, about its own axes."""
+        placement = self.placement
+        return (0.0, 0.0, 0.0) if placement is None else self.gimbal.of(placement.turn)
+
+    def turned_to(self, start: Placement, angles: tuple[float, float, float]) -> Placement:
+        """`start` with other angles about the object's own axes, degrees."""
+        return self.turned(start, self.gimbal.turn(angles))
 
     def centre(self) -> np.ndarray:
         """(3,) world: what the object turns about."""
@@ -141,20 +186,32 @@ class Placing:
 
     def turned(self, start: Placement, turn: tuple[float, float, float]) -> Placement:
         """`start` with another turn, about the object's foot or the middle of its outline."""
-        document, thing = self._editor.document, self._editor.object
-        assert document is not None and thing is not None and thing.lifted is not None
-        lifted, camera = thing.lifted, document.photo.camera
-        own = self._editor.derived.body_points(document, self._editor.current)
-        points = lifted.world_points(own)
         try:
-            down = ground_under(points, camera, self.horizon).normal
-        except GroundError:
-            down = np.array([0.0, 1.0, 0.0])
-        try:
-            changed = turned(start, turn, points, lifted, camera, down)
+            changed = turned(start, turn, *self._standing())
         except ValueError:  # behind the camera, as `move_to` will say
             changed = replace(start, turn=turn)
         return self.stood(changed)
+
+    def scaled(self, start: Placement, scale: float) -> Placement:
+        """`start` with another scale, about the object's foot where it stands."""
+        try:
+            changed = scaled(start, scale, *self._standing())
+        except ValueError:  # likewise
+            changed = replace(start, scale=scale)
+        return self.stood(changed)
+
+    def pivot(self) -> np.ndarray:
+        """(3,) world: what stays while the object grows; its foot where it stands."""
+        assert self.placement is not None
+        return foot_of(self.placement, *self._standing())
+
+    def _standing(self) -> tuple[np.ndarray, LiftedObject, Camera, np.ndarray]:
+        """The object's points (N, 3) world at rest, itself, the camera, and what is down there."""
+        document, thing = self._editor.document, self._editor.object
+        assert document is not None and thing is not None and thing.lifted is not None
+        own = self._editor.derived.body_points(document, self._editor.current)
+        points = thing.lifted.world_points(own)
+        return points, thing.lifted, document.photo.camera, self.gimbal.down
 
     def _offsets(self, placement: Placement) -> np.ndarray:
         """(N, 3) world: where the object's Gaussians are from its centre, turned and scaled."""

@@ -9,6 +9,7 @@ from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix
 from objectmorpher_core.document.model import Placement
 
 from ...canvas.ghost import ghost
+from ...editor.intents.placing import Placing
 from ...system.texts import t
 from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
 from ..widgets.theme import theme
@@ -134,7 +135,7 @@ def _draw_value(canvas: CanvasPainter, part: str | None) -> None:
     if placement is None or pointer is None or part is None:
         return
     if editor.hand.is_busy:
-        text = _value(part, placement, editor.placing.horizon)
+        text = _value(part, placement, editor.placing)
         before = editor.committed
         if part == "ball" and before is not None and editor.current < len(before.objects):
             text = f"{_angle(before.objects[editor.current].placement, placement):.0f}°"
@@ -160,8 +161,8 @@ def _draw_trust(canvas: CanvasPainter, at: ImVec2) -> None:
     canvas.label(words[sign], x + theme.pt(14), y)
 
 
-def _value(part: str, placement: Placement, horizon: float) -> str:
-    yaw, pitch, roll = placement.turn
+def _value(part: str, placement: Placement, placing: Placing) -> str:
+    yaw, pitch, roll = placing.angles
     away = t("{away} away", away=f"{placement.depth:+.2f} ×")
     values = {
         "move": f"{round(placement.move[0]):+d}, {round(placement.move[1]):+d} px",
@@ -172,7 +173,7 @@ def _value(part: str, placement: Placement, horizon: float) -> str:
         "roll": f"{t('Roll')} {roll:.1f}°",
         "ball": "",
         "turn": f"{t('Yaw')} {yaw:.0f}°  {t('Pitch')} {pitch:.0f}°",
-        "horizon": f"{horizon:.0f} px",
+        "horizon": f"{placing.horizon:.0f} px",
     }
     is_deeper = part == "move" and placement.depth != 0
     return f"{values[part]}  ·  {away}" if is_deeper else values[part]

@@ -67,7 +67,7 @@ def draw_place(editor: Editor) -> None:
         return
     _draw_ground(editor)
     gap(12)
-    values = dict(zip(_names(), _values(placement), strict=True))
+    values = dict(zip(_names(), _values(editor, placement), strict=True))
     for group in GROUPS:
         _draw_title(editor, group)
         for number in group.numbers:
@@ -75,11 +75,13 @@ def draw_place(editor: Editor) -> None:
             change = number_field(shown, values[number.name])
             values[number.name] = change.value
             if change.is_changed:
-                _change(editor, group, _placement(placement, values))
+                _change(editor, group, values)
             if change.is_done:
                 editor.commit(t(DONE[number.name]))
         if group.title == "Position":
             _draw_depth(editor, placement)
+        if group.title == "Turn":
+            _draw_seen_from(editor)
         gap(12)
     label = t(COMMANDS["reset_place"].label)
     command_button(editor, "reset_place", f"{Icon.RESET}  {label}")
@@ -123,13 +125,28 @@ def _draw_depth(editor: Editor, placement: Placement) -> None:
         editor.commit(t("Move object in depth"))
 
 
-def _change(editor: Editor, group: Group, placement: Placement) -> None:
+def _draw_seen_from(editor: Editor) -> None:
+    """How steeply one looks down on the object: yaw turns it about what is upright then."""
+    usual = editor.placing.usual_seen_from
+    number = Number(t("From above"), "%.0f°", 0.25, 1.0, usual, 0.0, 90.0)
+    change = number_field(number, editor.placing.seen_from)
+    tooltip(t("How steeply you look down on it: 0° from its side, 90° from above"))
+    if change.is_changed:
+        editor.placing.look_down(None if change.value == usual else change.value)
+    if change.is_done:
+        editor.commit(t("Set what is upright"))
+
+
+def _change(editor: Editor, group: Group, values: dict[str, float]) -> None:
     """Numbers of the position count as they are; what is turned or scaled stays on the ground."""
     placing, was = editor.placing, editor.placing.placement
-    if was is not None and placement.turn != was.turn:
-        placement = placing.turned(replace(placement, turn=was.turn), placement.turn)
-    elif group.title != "Position":
-        placement = placing.stood(placement)
+    assert was is not None, "its numbers are shown"
+    right, down, away, yaw, pitch, roll, scale = (values[name] for name in _names())
+    placement = replace(was, move=(right, down), depth=away)
+    if (yaw, pitch, roll) != placing.angles:
+        placement = placing.turned_to(placement, (yaw, pitch, roll))
+    elif group.title == "Size":
+        placement = placing.scaled(placement, scale / 100)
     placing.move_to(placement)
 
 
@@ -137,11 +154,5 @@ def _names() -> list[str]:
     return [number.name for group in GROUPS for number in group.numbers]
 
 
-def _values(p: Placement) -> tuple[float, ...]:
-    return (*p.move, p.depth, *p.turn, 100 * p.scale)
-
-
-def _placement(placement: Placement, values: dict[str, float]) -> Placement:
-    right, down, away, yaw, pitch, roll, scale = (values[name] for name in _names())
-    turn, move = (yaw, pitch, roll), (right, down)
-    return replace(placement, move=move, depth=away, turn=turn, scale=scale / 100)
+def _values(editor: Editor, p: Placement) -> tuple[float, ...]:
+    return (*p.move, p.depth, *editor.placing.angles, 100 * p.scale)

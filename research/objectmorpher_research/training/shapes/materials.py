@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import cv2
@@ -10,8 +10,8 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64
 
-PLAIN, PHOTO, GRAIN, STRIPES, CHECKS, PRINT, SPOTS = range(7)
-WEIGHTS = (0.22, 0.27, 0.17, 0.09, 0.05, 0.12, 0.08)  # how often each is chosen
+PLAIN, PHOTO, GRAIN, STRIPES, CHECKS, PRINT, SPOTS, FACE = range(8)
+WEIGHTS = (0.22, 0.27, 0.17, 0.09, 0.05, 0.12, 0.08)  # how often each but the last is chosen
 SMALLEST_CROP = 90  # px of a photograph
 
 
@@ -97,6 +97,19 @@ def a_material(rng: np.random.Generator, base: F64 | None = None) -> Material:
     )  # fmt: skip
 
 
+def a_print(
+    rng: np.random.Generator, picture: F32, frame: F64, ball: tuple[F64, float], reach: float
+) -> Material:
+    """A picture that lies over [-reach, reach] in the plane of a frame (3, 3); `ball` as built."""
+    plain = a_material(rng)
+    middle, radius = ball
+    return replace(
+        plain, kind=FACE, picture=picture, turn=frame.T, scale=reach / radius,
+        shift=middle @ frame / reach,
+        bumps=0.3 * plain.bumps,
+    )  # fmt: skip
+
+
 def albedo(material: Material, at: F64, normal: F64, noise: F32) -> F64:
     """(n, 3) the colour of places (n, 3) with normals (n, 3), object frame. `noise` (s, s, s)."""
     place = (at @ material.turn.T) / max(material.scale, 0.05) + material.shift
@@ -104,6 +117,9 @@ def albedo(material: Material, at: F64, normal: F64, noise: F32) -> F64:
     if material.kind == PLAIN:
         share = 0.25 * grain(noise, place)
         return first * (1 - share[:, None])
+    if material.kind == FACE:  # a picture on a flat thing
+        assert material.picture is not None
+        return _looked_up(material.picture, 0.5 * (place[:, :2] + 1))
     if material.kind == PHOTO:
         assert material.picture is not None
         return _triplanar(material.picture, 0.5 * place, normal)

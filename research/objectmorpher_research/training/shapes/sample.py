@@ -16,7 +16,8 @@ from objectmorpher_core.lift.crop import SIDE
 
 from .distance import lowest, trace
 from .families import FAMILIES
-from .materials import Material, a_colour, a_crop, a_material, albedo, grain, noise_block
+from .families.prints import REACH
+from .materials import Material, a_colour, a_crop, a_material, a_print, albedo, grain, noise_block
 from .solid import PrimitiveBuilder, Solid, turned
 
 COARSE = 56  # px of the first look, which finds the object's box
@@ -31,7 +32,7 @@ JUMP = 0.035  # crop units between neighbouring pixels, beyond what their slopes
 PART_JUMP = 0.014  # likewise where another part begins: an arm that lies on a body
 NO_GROUND = -99.0
 COLUMNS = 96  # rays each way, by which the ground beneath the object is found
-FACED = 0.4  # how often the photographer stood before the object
+FACED, FACED_PRINT = 0.4, 0.8  # how often the photographer stood before the object
 TWISTED, BENT = 1.0, 0.6  # radians per radius at most
 
 
@@ -83,12 +84,12 @@ def make_sample(seed: int, side: int = SIDE, families: tuple[str, ...] | None = 
 def _try(rng: np.random.Generator, name: str, side: int) -> Sample | None:
     """None where the object is hardly seen."""
     built = FAMILIES[name](rng)
-    if rng.random() < 0.12:
+    if not built.prints and rng.random() < 0.12:
         built.twist = float(np.clip(rng.normal(0, 0.5), -TWISTED, TWISTED))
-    if rng.random() < 0.1:
+    if not built.prints and rng.random() < 0.1:
         built.bend = float(np.clip(rng.normal(0, 0.25), -BENT, BENT))
     solid = built.finish()
-    eye = _aim(rng)
+    eye = _aim(rng, FACED_PRINT if built.prints else FACED)
     ground = lowest(solid, COLUMNS) if eye.axes[2, 1] < -0.05 and rng.random() < 0.75 else NO_GROUND
     eye = _framed(rng, solid, eye)
     if eye is None:
@@ -105,14 +106,17 @@ def _try(rng: np.random.Generator, name: str, side: int) -> Sample | None:
     return _measured(rng, name, eye, out, lengths, mask, picture)
 
 
-def _aim(rng: np.random.Generator) -> _Eye:
-    """A camera that looks at the object's middle, which is somewhere in its picture."""
+def _aim(rng: np.random.Generator, faced: float) -> _Eye:
+    """A camera that looks at the object's middle, which is somewhere in its picture.
+
+    `faced`: how often it stands before the object.
+    """
     field = np.radians(rng.uniform(*FIELDS))
     share = rng.uniform(*SHARES)
     width = 2 * np.tan(field / 2) * share  # tangents
     away = max(NEAREST, 1.25 / np.sin(np.arctan(width / 2)) / np.sqrt(2.0))
     pitch = np.radians(rng.choice([rng.uniform(-5, 35), rng.uniform(-50, 88)], p=[0.75, 0.25]))
-    yaw = rng.normal(0, 0.7) if rng.random() < FACED else rng.uniform(0, 2 * np.pi)
+    yaw = rng.normal(0, 0.7) if rng.random() < faced else rng.uniform(0, 2 * np.pi)
     axes = turned(yaw).T  # turns the object about the upright; what has a front looks along +z
     axes = turned(0, pitch, np.radians(rng.normal(0, 6))) @ axes
     room = 0.5 * max(2 * np.tan(field / 2) - width, 0.0)
@@ -163,7 +167,9 @@ def _materials(rng: np.random.Generator, built: PrimitiveBuilder) -> list[Materi
     base = a_colour(rng)
     found: dict[int, Material] = {}
     for number in built.material:
-        if number not in found:
+        if number in built.prints:
+            found[number] = a_print(rng, *built.prints[number], built.ball, REACH)
+        elif number not in found:
             found[number] = a_material(rng, base if rng.random() < 0.35 else None)
     return [found[number] for number in built.material]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.arrays import F32, F64
 
 from . import distance as sdf
 
@@ -63,11 +63,15 @@ class PrimitiveBuilder:
     """Primitives, part by part; every method adds to the part that `part` began last."""
 
     material: list[int] = field(default_factory=list)  # of each part
+    # Of a material: a picture (h, w, 3) over the xy-plane of a frame whose axes are (3, 3)
+    prints: dict[int, tuple[F32, F64]] = field(default_factory=dict)
     _parts: list[list[_Primitive]] = field(default_factory=list)
     _outlines: list[F64] = field(default_factory=list)
     _rows: int = 0
     twist: float = 0.0  # radians per radius of the object's ball, about y
     bend: float = 0.0  # the same sideways
+    # Of the finished object: its middle and the radius of its ball, in lengths of building
+    ball: tuple[F64, float] = field(default_factory=lambda: (np.zeros(3), 1.0))
 
     def part(self, material: int = 0) -> None:
         """Begins a part, which looks like the others of that material."""
@@ -173,6 +177,7 @@ class PrimitiveBuilder:
         centre = 0.5 * (everything.min(0) + everything.max(0))
         radius = MARGIN * np.linalg.norm(everything - centre, axis=1).max()
         radius += BULGE * max(p.soft for part in self._parts for p in part)
+        self.ball = centre, float(radius)
         scale, flat = 1 / radius, [p for part in self._parts for p in part]
         to_object = np.diag([scale, scale, scale, 1.0])
         to_object[:3, 3] = -scale * centre

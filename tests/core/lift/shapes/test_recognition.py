@@ -61,6 +61,7 @@ def _doughnut() -> Mesh:
 MADE = {
     "box": _box, "ball": _ball, "can": _can, "leaf": _leaf, "vase": _vase, "doughnut": _doughnut,
 }  # fmt: skip
+FIVE_DEGREES = np.cos(np.radians(5.0))
 KINDS = {"box": "box", "leaf": "flat"}  # the others are round
 
 
@@ -111,6 +112,11 @@ def test_a_shape_is_recognised_and_completed(name: str) -> None:
     body, camera = body_of(seen)
     whole = completed(fused(body, seen, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
     assert whole.kind == KINDS.get(name, "round")
+    if name in ("ball", "leaf"):
+        assert found.up is None
+    else:
+        assert whole.up is not None and whole.up[1] < 0, "up"
+        assert np.abs(MADE[name]().axes @ whole.up).max() > FIVE_DEGREES
     before, after = (
         score(as_far(surfaces_of(each, seen.mask), true, seen.mask, camera), true, seen.mask)
         for each in (body, whole)

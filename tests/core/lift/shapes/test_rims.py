@@ -73,6 +73,7 @@ def test_a_plate_lies_as_its_rim_says() -> None:
     rims, found, (before, after), _ = _laid(_saucer())
     assert len(rims) == 1
     assert rims[0].normal @ UP > DEGREE
+    assert found.up is not None and found.up @ UP > DEGREE
     assert before < 0.6
     assert abs(after - 1) < 0.05
     half = found.back.half(found.silhouette.cells.reshape(-1, 2)).reshape(found.silhouette.shape)

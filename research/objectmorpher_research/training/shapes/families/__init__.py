@@ -15,6 +15,7 @@ from .figures import figures
 from .furniture import furniture
 from .lumps import superquadrics
 from .plants import plants
+from .prints import prints
 from .rings import rings
 from .sheets import sheets
 from .vehicles import vehicles
@@ -36,6 +37,7 @@ FAMILIES: dict[str, Family] = {
     "sheets": sheets,
     "superquadrics": superquadrics,
     "extrusions": extrusions,
+    "prints": prints,
 }
 
 __all__ = ["FAMILIES", "Family"]
