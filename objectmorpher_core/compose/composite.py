@@ -375,7 +375,7 @@ def _with(
     if thing.item.is_visitor:  # nothing of it was ever there
         around = replace(around, shift=np.full_like(around.shift, ELSEWHERE))
     moved = displacement(around, rest)[inner]
-    if thing.item.is_in_place:  # whatever its shape says: there the photo shows it
+    if _is_only_painted(thing.item):  # whatever its shape says: there the photo shows it
         moved = np.zeros_like(moved)
     picture = _part(around, inner.start, inner.stop)
     through = 1 - picture.alpha
@@ -399,6 +399,12 @@ def _with(
         is_covered=rows.is_covered | (rest[inner] > 0) | (picture.alpha > 0),
         touched=touched,
     )
+
+
+def _is_only_painted(item: EditObject) -> bool:
+    """Whether it is where it was in the photo."""
+    is_there = item.pose is None and item.placement.is_identity and not item.is_visitor
+    return item.is_painted and is_there
 
 
 def _count_changes(photo: Pixels, pixels: Pixels, footprint: Mask) -> tuple[int, int]:

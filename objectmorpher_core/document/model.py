@@ -462,12 +462,6 @@ class EditObject:
         return self.matte is not None and self.matte.paint is not None
 
     @property
-    def is_in_place(self) -> bool:
-        """Whether it is painted where it was in the photo, and nothing else was done to it."""
-        is_there = self.pose is None and self.placement.is_identity and self.is_visible
-        return self.is_painted and is_there and not self.is_visitor
-
-    @property
     def shown(self) -> LiftedObject | None:
         """Return its lift with the paint on its plain colours; for the rest see `Matte.shown`."""
         if self.lifted is None or self.matte is None or self.matte.paint is None:
