@@ -43,6 +43,7 @@ from .light.harmonize import lit, saturated
 from .light.lighting import NOTHING, Lighting, Lit
 from .light.lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
+from .paint import PaintedShare
 from .plate.plate import hole_margin, plate_crop, plate_of_holes
 from .shadow.shadow import Shade
 
@@ -179,6 +180,11 @@ class _Drawing:
             for k, thing in enumerate(things)
             if thing.item.is_moved and thing.item.is_visible and thing.splats is not None
         }
+        self._paint = {
+            k: paint
+            for k, shown in self._drawables.items()
+            if (paint := PaintedShare.of(shown.splats, things[k].matte, camera)) is not None
+        }
         self._textures = {
             k: object_texture(things[k].matte, things[k].item.lifted) for k in self._drawables
         }
@@ -223,7 +229,8 @@ class _Drawing:
         for k, thing in enumerate(self._things):
             picture = self._draw(k, above, below)
             if picture is not None:
-                rows = map_in_threads(partial(_with, thing, picture, above), rows)
+                paint = self._paint[k].draw((x0, above, x1, below)) if k in self._paint else None
+                rows = map_in_threads(partial(_with, thing, picture, above, paint), rows)
             elif not thing.item.is_moved:
                 rows = map_in_threads(partial(_at_rest, thing), rows)
             elif thing.has_hole:
@@ -350,8 +357,13 @@ def _at_rest(thing: Moved, rows: Rows) -> Rows:
     )
 
 
-def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
-    """`rows` with an object over them whose picture `drawn` begins at row `above`."""
+def _with(
+    thing: Moved, drawn: Picture3D, above: int, paint: F32 | None, rows: Rows
+) -> Rows:  # fmt: skip
+    """`rows` with an object over them whose picture `drawn` begins at row `above`.
+
+    `paint` (h, w) is how much of that was painted.
+    """
     matte = thing.matte
     x0, y0, x1, y1 = rows.box
     top, bottom = max(y0 - NEAR // 2, above), min(y1 + NEAR // 2, above + len(drawn.alpha))
@@ -363,6 +375,8 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
     if thing.item.is_visitor:  # nothing of it was ever there
         around = replace(around, shift=np.full_like(around.shift, ELSEWHERE))
     moved = displacement(around, rest)[inner]
+    if _is_only_painted(thing.item):  # whatever its shape says: there the photo shows it
+        moved = np.zeros_like(moved)
     picture = _part(around, inner.start, inner.stop)
     through = 1 - picture.alpha
     touched = None if rows.touched is None else rows.touched * through
@@ -370,16 +384,27 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
     if thing.item.finish != AS_IN_THE_PHOTO or thing.look.is_shaded:
         own = np.maximum(picture.alpha, rest[inner])
         touched = own if touched is None else np.maximum(touched, own)
+    from_photo = picture.from_photo
+    if paint is not None:
+        own = paint[y0 - above : y1 - above]
+        touched = own if touched is None else np.maximum(touched, own)
+        from_photo = from_photo * (1 - np.minimum(own / np.maximum(picture.alpha, 1e-6), 1))
     return replace(
         rows,
         colour=mixed(rows.colour, picture.color, picture.alpha, thing.look.mode),
-        from_photo=picture.from_photo + through * rows.from_photo,
-        from_lifter=picture.alpha - picture.from_photo + through * rows.from_lifter,
+        from_photo=from_photo + through * rows.from_photo,
+        from_lifter=picture.alpha - from_photo + through * rows.from_lifter,
         from_inpainter=through * rows.from_inpainter,
         moved=np.maximum(rows.moved, moved),
         is_covered=rows.is_covered | (rest[inner] > 0) | (picture.alpha > 0),
         touched=touched,
     )
+
+
+def _is_only_painted(item: EditObject) -> bool:
+    """Whether it is where it was in the photo."""
+    is_there = item.pose is None and item.placement.is_identity and not item.is_visitor
+    return item.is_painted and is_there
 
 
 def _count_changes(photo: Pixels, pixels: Pixels, footprint: Mask) -> tuple[int, int]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..base.arrays import Mask
+from ..base.arrays import F64, Mask
 from ..base.camera import Camera
 from ..document.model import Document, EditObject, Matte
 from ..raster.posed import PosedSplats
@@ -19,6 +19,8 @@ FRAMED = 3  # sides of the photo: what touches so many is its background
 ALONG = 0.1  # of a side's length, from which it is touched
 SHADOW = 0.5  # x an object's size, how far the edge of its shadow reaches
 EDGE = 4.0  # x the spacing of the Gaussians, how far an object reaches around their means
+DIGITS = 2  # of a row: what differs less is alike
+LEAST_BELOW = 0.1  # x the photo's height, from the horizon down to what stands
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 px of the photo
 Posed = Callable[[int], PosedSplats]
 Stack = dict[int, PosedSplats | None]  # None: drawn by its matte, it was never lifted
@@ -43,7 +45,7 @@ def stack(document: Document, posed: Posed) -> Stack:
             is_second = any(_rests(other, item) for other in objects[:k])
             if item.matte and not is_second and any(_meet(item.matte.box, b) for b in reach):
                 there[k] = None if item.stays_in_front else posed(k)
-    return {k: there[k] for k in back_to_front(objects, there)}
+    return {k: there[k] for k in back_to_front(document, there)}
 
 
 def stands_in_front(item: EditObject) -> bool:
@@ -79,20 +81,53 @@ def _hidden(mask: Mask, splats: PosedSplats, camera: Camera) -> float:
     return float(mask[y[is_seen], x[is_seen]].mean()) if is_seen.any() else 0.0
 
 
-def back_to_front(
-    objects: tuple[EditObject, ...], splats: Mapping[int, PosedSplats | None]
-) -> list[int]:
-    """Return the keys of `splats` by layer, and within a layer by depth, the farthest first.
+def back_to_front(document: Document, splats: Mapping[int, PosedSplats | None]) -> list[int]:
+    """Return the keys of `splats` by layer, and within a layer by where they stand.
 
-    Of two at one depth the later is in front: a copy that was moved aside. What has no depth, for
-    it was told to stay in front, is the nearest.
+    The nearer is in front: what stands lower in the picture. Of two alike the later is in front: a
+    copy that was moved aside. What has no Gaussians, for it was told to stay in front, is the
+    nearest.
     """
-    return sorted(splats, key=lambda k: (objects[k].layer, -_depth(splats[k]), k))
+    objects, rows = document.objects, _rows(document, splats)
+    return sorted(splats, key=lambda k: (objects[k].layer, rows[k], k))
 
 
-def _depth(splats: PosedSplats | None) -> float:
-    """World units; without its last digits, which differ between equal depths."""
-    return -np.inf if splats is None else float(np.float32(splats.middle_depth))
+def _rows(document: Document, splats: Mapping[int, PosedSplats | None]) -> dict[int, float]:
+    """Photo px: the row in which each object stands; the lower it is, the nearer.
+
+    A lift knows no distance, but all feet are on one ground. What floats, as the artist says, is
+    where a foot would be seen at its depth, on the ground of the first that stands.
+    """
+    objects, camera = document.objects, document.photo.camera
+    standing = [o.lifted for o in objects if o.lifted and not o.is_visitor and not _floats(o)]
+    ground, below, depth = 0.0, float(camera.height), 1.0
+    if standing:
+        nodes = standing[0].world_points(standing[0].control_points)
+        ground, depth = _foot(nodes, camera), float(np.median(nodes[:, 2]))
+        horizon = camera.height / 2 if document.horizon is None else document.horizon
+        below = max(ground - horizon, LEAST_BELOW * camera.height)
+    rows = {}
+    for k, own in splats.items():
+        if own is None:
+            rows[k] = np.inf
+        elif _floats(objects[k]):
+            middle = max(float(np.median(own.nodes[:, 2])), 1e-9)
+            rows[k] = round(ground + below * (depth / middle - 1), DIGITS)
+        else:
+            rows[k] = round(_foot(own.nodes, camera), DIGITS)
+    return rows
+
+
+def _floats(item: EditObject) -> bool:
+    """Whether the artist says that it does not stand."""
+    return not (item.shape.is_standing or item.is_grounded)
+
+
+def _foot(nodes: F64, camera: Camera) -> float:
+    """Px: the lowest row in which one of the points (N, 3) is seen; inf around the camera."""
+    if (nodes[:, 2] <= 0).any():
+        return np.inf
+    return float(camera.project(nodes)[:, 1].max())
 
 
 def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) -> Document:
@@ -101,10 +136,11 @@ def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) ->
     Object `k` is the one that was put elsewhere; other layers are raised only where they must be.
     """
     objects = list(document.objects)
-    depths = {i: _depth(None if stands_in_front(objects[i]) else posed(i)) for i in order}
+    there = {i: None if stands_in_front(objects[i]) else posed(i) for i in order}
+    rows = _rows(document, there)
 
     def is_nearer(one: int, other: int) -> bool:
-        return (-depths[one], one) > (-depths[other], other)
+        return (rows[one], one) > (rows[other], other)
 
     def least(below: int, above: int) -> int:
         """The lowest layer of `above` that puts it in front of `below`."""

@@ -80,6 +80,14 @@ class Puppet:
         other._similar, other._deformer = self._deformer or self._similar, None
         return other
 
+    def recoloured(self, lifted: LiftedObject) -> Puppet:
+        """Return the same object in the plain colours of `lifted`, alike but for them."""
+        other = copy.copy(self)
+        other.lifted, other._rest = lifted, self._rest.recoloured(lifted.gaussians.colors)
+        vars(other).pop("_draft_rest", None)
+        other._lock = Lock()
+        return other
+
     def posed(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The object's Gaussians in the world after `pose`, then `placement`."""
         if pose is None or not self._settings.is_splitting:
@@ -223,6 +231,7 @@ class Puppet:
 
 
 def puppet_of(item: EditObject, camera: Camera) -> Puppet:
-    """The puppet of a lifted object of the document."""
-    assert item.lifted is not None, "only a lifted object can be moved"
-    return Puppet(item.lifted, item.deform, camera, item.rig)
+    """The puppet of a lifted object of the document, with its paint."""
+    lifted = item.shown
+    assert lifted is not None, "only a lifted object can be moved"
+    return Puppet(lifted, item.deform, camera, item.rig)

@@ -20,6 +20,7 @@ from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
 from .bounds import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 from .gaussians import Gaussians
+from .paint import Paint
 from .pose import UNHELD, Base, Handle, Pose
 from .rig import Rig
 from .settings import AS_IN_THE_PHOTO, Finish, Hint, Refined, Shadow
@@ -105,6 +106,7 @@ class Matte:
     top: int
     alpha: F32  # (h, w) in [0, 1]
     foreground: F32  # (h, w, 3) sRGB in [0, 1], straight
+    paint: Paint | None = None  # over it, where the artist has painted
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "alpha", frozen(self.alpha, np.float32))
@@ -115,6 +117,13 @@ class Matte:
         """x0, y0, x1, y1 px of the crop in the photo."""
         height, width = self.alpha.shape
         return self.left, self.top, self.left + width, self.top + height
+
+    @property
+    def shown(self) -> F32:
+        """(h, w, 3) the foreground with its paint."""
+        if self.paint is None:
+            return self.foreground
+        return self.paint.over(self.foreground, self.left, self.top)
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,7 +393,7 @@ class EditObject:
     pose: Pose | None = None  # None: at rest
     placement: Placement = Placement()
     is_visible: bool = True
-    layer: int = 0  # in front of all of a lower one; within a layer the nearer is in front
+    layer: int = 0  # in front of all of a lower one; within a layer the nearer, see compose.order
     coverage: U8 | None = None  # (H, W) where the edge was drawn soft; None: found in the photo
     found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
     shadow: Shadow = field(default_factory=Shadow)
@@ -445,8 +454,21 @@ class EditObject:
         """Whether the object is anywhere else than in the photo, or looks otherwise."""
         return self.lifted is not None and (
             self.is_visitor or self.pose is not None or not self.placement.is_identity
-            or not self.is_visible or self.finish != AS_IN_THE_PHOTO
+            or not self.is_visible or self.finish != AS_IN_THE_PHOTO or self.is_painted
         )  # fmt: skip
+
+    @property
+    def is_painted(self) -> bool:
+        return self.matte is not None and self.matte.paint is not None
+
+    @property
+    def shown(self) -> LiftedObject | None:
+        """Return its lift with the paint on its plain colours; for the rest see `Matte.shown`."""
+        if self.lifted is None or self.matte is None or self.matte.paint is None:
+            return self.lifted
+        gaussians = self.lifted.gaussians
+        colors = self.matte.paint.on_spots(gaussians.colors)
+        return replace(self.lifted, gaussians=replace(gaussians, colors=colors))
 
     @property
     def selection(self) -> Selection | None:

@@ -33,7 +33,9 @@ from ..document.model import (
     PhotoTexture,
     Placement,
     Plate,
+    Sides,
 )
+from ..document.paint import Paint
 from ..document.pose import Base, Pose
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width, cut_out
@@ -62,7 +64,7 @@ def carried_over(
 
     Of two handles that would share a control point the later one is gone.
     """
-    changed = item.with_lifted(matte, lifted, shape)
+    changed = item.with_lifted(_repainted(matte, item, lifted), lifted, shape)
     old = item.lifted
     if old is None:
         return changed
@@ -105,11 +107,34 @@ def refitted(item: EditObject, matte: Matte, lifted: LiftedObject, camera: Camer
         return KeyPose(handles, moved(key.pose), placement, rig.held, rig.shifts, based(key.base))
 
     return replace(
-        item, matte=matte, contaminated=None, lifted=lifted, shaped=None,
+        item, matte=_repainted(matte, item, lifted), contaminated=None, lifted=lifted, shaped=None,
         handles=_held(item.handles, lifted), rig=item.rig.moved_to(nearest[:, 0]),
         pose=moved(item.pose), placement=_same_motion(item.placement, old, lifted, camera),
         base=based(item.base), keys=tuple(map(kept, item.keys)),
     )  # fmt: skip
+
+
+def _repainted(matte: Matte, item: EditObject, lifted: LiftedObject) -> Matte:
+    """`matte` with the paint on `item`, whose shape is `lifted` now.
+
+    Where the invented pictures are others, what was painted on them is gone.
+    """
+    old, paint = item.lifted, None if item.matte is None else item.matte.paint
+    if old is None or paint is None:
+        return replace(matte, paint=None) if matte.paint is not None else matte
+    reach = HANDLE_STILL_THERE * old.spacing * old.scale
+    before = KDTree(old.world_points(old.gaussians.means))
+    gaps, nearest = before.query(lifted.world_points(lifted.gaussians.means))
+    spots = np.where((gaps < reach)[:, None], paint.spots[nearest], 0)
+    paint, sides = replace(paint, spots=spots), (old.sides, lifted.sides)
+    if sides[0] is None or sides[1] is None or not _same_pictures(sides[0], sides[1]):
+        paint = Paint((), paint.spots).with_pixels(matte.box, paint.crop(matte.box))
+    return replace(matte, paint=paint)
+
+
+def _same_pictures(one: Sides, other: Sides) -> bool:
+    is_there = (one.left, one.top) == (other.left, other.top)
+    return is_there and np.array_equal(one.pixels, other.pixels)
 
 
 def _held(handles: tuple[Handle, ...], lifted: LiftedObject) -> tuple[Handle, ...]:

@@ -96,18 +96,15 @@ class RestSplats:
         other.__dict__.pop("blocks", None)
         return other
 
-    def brightened(self) -> RestSplats:
-        """Return the same object in its own colours brighter by 1.
-
-        What it shows of the photo is as it was: the difference between both says where that is.
-        """
+    def recoloured(self, colors: np.ndarray) -> RestSplats:
+        """Return the same object in own `colors` (N, 3); it shows the photo as it did."""
         other = copy.copy(self)
-        gaussians = self.lifted.gaussians
-        other.lifted = replace(
-            self.lifted, gaussians=replace(gaussians, colors=gaussians.colors + np.float32(1))
-        )
+        gaussians = replace(self.lifted.gaussians, colors=np.asarray(colors, np.float32))
+        other.lifted = replace(self.lifted, gaussians=gaussians)
         blocks = self.blocks.copy()
-        blocks[:, COLOUR:] += 1
+        table = np.zeros((blocks.shape[0] * LANES, 3), np.float32)
+        table[: len(self)] = gaussians.colors
+        blocks[:, COLOUR:] = table.reshape(-1, LANES, 3).transpose(0, 2, 1)
         other.blocks = frozen(blocks)
         return other
 
@@ -203,9 +200,16 @@ class PosedSplats:
         """Return the same object in plain `colors` (N, 3), see `RestSplats.painted`."""
         return replace(self, rest=self.rest.painted(colors, has_edge))
 
+    def recoloured(self, colors: np.ndarray) -> PosedSplats:
+        """Return the same object in own `colors` (N, 3), see `RestSplats.recoloured`."""
+        return replace(self, rest=self.rest.recoloured(colors))
+
     def brightened(self) -> PosedSplats:
-        """Return the same object in its own colours brighter by 1, see `RestSplats.brightened`."""
-        return replace(self, rest=self.rest.brightened())
+        """Return the same object in its own colours brighter by 1.
+
+        What it shows of the photo is as it was: the difference between both says where that is.
+        """
+        return self.recoloured(self.rest.lifted.gaussians.colors + np.float32(1))
 
     @property
     def is_layered(self) -> bool:
@@ -255,11 +259,15 @@ class PosedSplats:
         return self.world_from_object[:3, :3] @ self.skinned.linear @ np.linalg.inv(world)
 
     @cached_property
-    def middle_depth(self) -> float:
-        """World units: median depth of the control points, or of the Gaussians without a rig."""
-        points = self.motion.motion.points if isinstance(self.motion, Skin) else self.skinned.points
+    def nodes(self) -> F64:
+        """(M, 3) world: the control points; of pieces, which have none of their own, the means."""
+        points = self.rest.lifted.control_points
+        if isinstance(self.motion, Skin):
+            points = self.motion.motion.points
+        elif self.motion is not None:
+            points = self.motion.points
         matrix = self.world_from_object
-        return float(np.median(points @ matrix[2, :3] + matrix[2, 3]))
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def projection_jacobians(points: np.ndarray, focal: float) -> F64:

@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, RGB, Mask
+from ..base.arrays import F32, RGB, U8, Mask
 from ..base.camera import Camera
 from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
@@ -35,6 +35,7 @@ from ..document.model import (
     Plate,
     Pose,
 )
+from ..document.paint import Paint
 from ..document.placement import gimbal_of
 from ..pictures.image import to_u8
 
@@ -84,6 +85,10 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
             size = own.width // times, own.height // times
             origin = replace(origin, camera=_camera(own, times, *size))
         lifted = replace(lifted, texture=texture, middle=None, origin=origin)
+        if matte is not None and matte.paint is not None and (sides := lifted.sides) is not None:
+            own = matte.paint.over(_unit(sides.pixels), sides.left, sides.top)
+            sides = replace(sides, pixels=np.rint(own * 255).astype(np.uint8))
+            lifted = replace(lifted, sides=sides)
     return replace(
         item, mask=mask, coverage=None, found=None, lifted=lifted,
         matte=None if matte is None else _matte(matte, times), mixed=None, contaminated=None,
@@ -108,7 +113,16 @@ def _matte(matte: Matte, times: int) -> Matte:
     small = _means(alpha, times)
     beyond = _means(np.asarray(foreground, np.float32), times)
     straight = np.where(small[..., None] > 0, own / np.maximum(small, 1e-6)[..., None], beyond)
-    return Matte(box[0] // times, box[1] // times, small, straight)
+    left, top, paint = box[0] // times, box[1] // times, None
+    if matte.paint is not None:  # of the photo's part; that of the sides is in their pictures
+        rgba = _unit(matte.paint.crop(box))
+        own = _means(np.dstack([rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]]), times)
+        own[..., :3] /= np.maximum(own[..., 3:], 1e-6)
+        levels = np.rint(255 * own).astype(np.uint8)
+        height, width = small.shape
+        paint = Paint((), matte.paint.spots)
+        paint = paint.with_pixels((left, top, left + width, top + height), levels)
+    return Matte(left, top, small, straight, paint)
 
 
 def _plate(plate: Plate, times: int, photo: np.ndarray) -> Plate:
@@ -142,6 +156,10 @@ def _aligned(box: Box, times: int) -> Box:
         -(-x1 // times) * times,
         -(-y1 // times) * times,
     )
+
+
+def _unit(levels: U8) -> F32:
+    return np.asarray(levels / np.float32(255), np.float32)
 
 
 def _means(values: F32, times: int) -> F32:

@@ -27,6 +27,7 @@ from ..base.files import OutputError, reason_of, write_all
 from ..base.limits import PICTURE_PIXELS, SESSION_DOCUMENT, SESSION_OBJECTS
 from ..base.quoting import named, shown
 from ..document.model import SELECTED, Document, EditObject, KeyPose, Photo
+from ..document.paint import SIDE
 from ..document.settings import LEAST_FEATHER, MOST_FEATHER
 from ..pictures.image import ImageError, encode_picture, read_picture
 from .tree import ArrayError, SessionError, TreeReader, TreeWriter, read_npy
@@ -40,6 +41,7 @@ __all__ = [
 VERSION = 1
 FORMAT = "objectmorpher session"
 DOCUMENT, ARRAYS = "document.json", "arrays.npz"
+MOST_TEXTURE = 1 << 20  # px, how far from the photo's corner an object's texture may lie
 MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
 MOST_INVENTED = 2_000_000  # px of invented pictures: a small photo has fewer
 
@@ -307,6 +309,7 @@ def _check(document: Document) -> None:
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
             _near("matte", item.matte.box, _size_around(item, (width, height)))
+        _check_paint(item)
         _check_lifted(item)
         if item.seen_from is not None and not 0 <= item.seen_from <= 90:
             raise ValueError(f"an object is seen from {item.seen_from:g} degrees above")
@@ -358,6 +361,19 @@ def _check_coverage(item: EditObject) -> None:
         shape = None if item.mask is None else item.mask.shape
         if of_photo is not None:
             _same("a part of a mask", (of_photo.shape, of_photo.dtype), (shape, np.dtype(bool)))
+
+
+def _check_paint(item: EditObject) -> None:
+    paint = None if item.matte is None else item.matte.paint
+    if paint is None:
+        return
+    if item.lifted is None:
+        raise ValueError("an object that is not lifted is painted")
+    _same("paint on Gaussians", paint.spots.shape, (len(item.lifted.gaussians), 4))
+    for tile in paint.tiles:
+        _same("paint", tile.rgba.shape, (SIDE, SIDE, 4))
+        if max(abs(tile.left), abs(tile.top)) > MOST_TEXTURE or tile.left % SIDE or tile.top % SIDE:
+            raise ValueError("paint lies where no texture is")
 
 
 def _check_lifted(item: EditObject) -> None:

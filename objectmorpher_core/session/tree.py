@@ -66,11 +66,14 @@ class TreeWriter:
         if array.dtype.kind == "f" and not all_finite(array):
             raise SessionError(f"{path} holds values that are not finite and cannot be saved")
         is_mask = array.dtype == np.bool_ and array.ndim == 2
-        is_pixels = array.dtype in (np.uint8, np.uint16) and array.shape[2:] == (3,)
+        is_pixels = array.dtype in (np.uint8, np.uint16) and array.shape[2:] in ((3,), (4,))
         if array.size and (is_mask or is_pixels):
             member = f"{path}.png"
+            alpha = array[..., 3] if array.shape[2:] == (4,) else None
             self.pictures[member] = (
-                encode_mask(array) if is_mask else encode_picture(Picture(array), "png")
+                encode_mask(array)
+                if is_mask
+                else encode_picture(Picture(array[..., :3], alpha), "png")
             )
             return {"png": member}
         self.arrays[path] = array
@@ -156,6 +159,8 @@ class TreeReader:
             except ImageError as error:
                 raise SessionError(f"the session is damaged: {named(member)}: {error}") from error
             pixels = picture.pixels
+            if picture.alpha is not None:
+                pixels = frozen(np.dstack([pixels, picture.alpha]))
             self._pictures[member] = frozen(pixels[..., 0] > 127) if picture.is_grey else pixels
         return self._pictures[member]
 

@@ -19,7 +19,7 @@ from imgui_bundle import imgui
 from objectmorpher.cli.options import WindowOptions
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import Painted, PoseMode, ToolName
+from objectmorpher.editor.view import ComposeView, Painted, PoseMode, ToolName
 from objectmorpher.gui.window import landmarks
 from objectmorpher.gui.window.glfw_window import open_window
 from objectmorpher.gui.window.window import Window
@@ -57,7 +57,7 @@ class Flipper:
         editor = self.editor
         editor.view.popup, editor.filing.wanted, editor.message = None, None, None
         editor.start(self._document)
-        editor.current, editor.view.compose.is_bare = 0, False
+        editor.current, editor.view.compose = 0, ComposeView()
         editor.view.selecting.painted, editor.view.pose.mode = Painted.SELECTION, PoseMode.DRAG
         editor.view.wants_panel = True
         self._hold(2.0, SIZE[1] - 2.0)

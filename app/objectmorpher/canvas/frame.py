@@ -139,7 +139,7 @@ def drawn_order(document: Document, shown: Shown, posed: Callable[[int], PosedSp
         for k, o in enumerate(objects)
         if o.lifted is not None and o.is_visible and not is_front(document, k)
     }
-    return back_to_front(objects, there)
+    return back_to_front(document, there)
 
 
 def _parts(
@@ -218,6 +218,7 @@ def _blend(
     shades = ((look.shade, look.relit if look.is_shaded else None) for look in looks)
     key = (*view.place, *(id(part) for pair in shades for part in pair), *(x.blur for x in looks))
     if cache.blended is None or cache.blended[0] is not document or cache.blended[1] != key:
-        touched = cache.lights.touched(plate, looks, view, CELL)
+        mattes = [own.item.matte for own, _ in moved if own.item.matte is not None]
+        touched = cache.lights.touched(plate, looks, view, CELL, mattes)
         cache.blended = (document, key, build_blend(document, moved, view, touched))
     return cache.blended[2]

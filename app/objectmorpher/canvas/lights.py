@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.document.model import Document, Placement, Plate
+from objectmorpher_core.document.model import Document, Matte, Placement, Plate
 from objectmorpher_core.document.settings import AS_IN_THE_PHOTO
 
 from ..editor.view import ViewState
@@ -179,8 +179,15 @@ class Lights:
 
     # Where it is shown
 
-    def touched(self, plate: Plate | None, looks: Iterable[Lit], view: ViewState, cell: int) -> F32:
-        """(h, w) on a grid of `cell` canvas px: 1 where shadows or repairs are.
+    def touched(
+        self,
+        plate: Plate | None,
+        looks: Iterable[Lit],
+        view: ViewState,
+        cell: int,
+        mattes: Iterable[Matte] = (),
+    ) -> F32:
+        """(h, w) on a grid of `cell` canvas px: 1 where shadows, repairs or paint are.
 
         `plate` is the one that the edit shows; None where nothing has moved.
         """
@@ -196,6 +203,10 @@ class Lights:
         if plate is not None and plate.painted is not None:
             small, pitch = self._painted(lambda: _shrunk(plate.painted), plate.painted)
             _mark(touched, small, (plate.left, plate.top), pitch, (view, cell))
+        for matte in mattes:
+            if matte.paint is not None:
+                there = matte.paint.crop(matte.box)[..., 3] > 0
+                _mark(touched, there, (matte.left, matte.top), 1.0, (view, cell))
         return touched
 
 

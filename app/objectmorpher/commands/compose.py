@@ -24,6 +24,29 @@ def _is_bare(editor: Editor) -> bool:
     return editor.view.tool is ToolName.COMPOSE and editor.view.compose.is_bare
 
 
+def _toggle_painting(editor: Editor) -> None:
+    if editor.view.tool is not ToolName.COMPOSE:
+        editor.choose_tool(ToolName.COMPOSE)
+        editor.view.compose.is_painting = False
+    editor.painting.toggle()
+
+
+def _is_painting(editor: Editor) -> bool:
+    return editor.view.tool is ToolName.COMPOSE and editor.view.compose.is_painting
+
+
+def _cannot_paint(editor: Editor) -> str | None:
+    if (reason := no_lift(editor)) is not None:
+        return reason
+    is_shown = editor.object is not None and editor.object.is_visible
+    return None if is_shown else t("The object is hidden")
+
+
+def _not_painted(editor: Editor) -> str | None:
+    is_painted = editor.object is not None and editor.object.is_painted
+    return no_lift(editor) or (None if is_painted else t("Nothing is painted on the object"))
+
+
 def _toggle_taking(editor: Editor) -> None:
     """To the drag that says from where, with the background alone; or back to repairing."""
     is_taking = _is_taking(editor)
@@ -117,6 +140,12 @@ def _cannot_look(editor: Editor) -> str | None:
 
 COMMANDS: dict[str, Command] = {
     "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
+    "paint": Command(
+        "Paint on the object", "Shift+P", _toggle_painting, _cannot_paint, _is_painting
+    ),
+    "unpaint": Command(
+        "Remove paint", "", lambda e: e.painting.remove(), _not_painted
+    ),
     "take_from": Command(
         "Fill from a spot", "Shift+B", _toggle_taking, nothing_lifted, _is_taking
     ),

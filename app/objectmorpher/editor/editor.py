@@ -35,6 +35,7 @@ from .intents.masking import Masking
 from .intents.methods import Methods
 from .intents.models import Models
 from .intents.objects import Objects
+from .intents.painting import Painting
 from .intents.pasting import Pasting
 from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
@@ -79,6 +80,7 @@ class Editor(EditorState):
         self.models = Models(self, self.methods, self.shaping, self.tasks)
         self.composing = Composing(self, self.methods, self.tasks, self.choose_tool)
         self.hinting = Hinting(self, self.composing)
+        self.painting = Painting(self)
         self.refining, self.exporting = RefiningIntents(self, self.methods), Exporting(self)
         self.tabs = Tabs(self, self.posing, self.tasks, self.start, self.leave)
         self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.tabs)
@@ -105,7 +107,8 @@ class Editor(EditorState):
         tasks = self.tasks
         return (
             self.jobs.poll, self.chores.poll, tasks.rehearse, tasks.ensure_fronts,
-            self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.refining.deliver,
+            self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
+            self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
             self.leaving_out.poll,
         )  # fmt: skip
@@ -170,6 +173,7 @@ class Editor(EditorState):
         self.refits.forget()
         self.edging.forget()
         self.composing.forget()
+        self.painting.forget()
         self.hinting.forget()
         self.refining.forget()
         self.posing.forget()

@@ -135,12 +135,24 @@ class Composed(Enum):
     TAKE = "Fill from"
 
 
+class PaintWith(Enum):
+    """Things that are painted on an object."""
+
+    COLOUR = "Colour"
+    CLONE = "Clone"
+
+
 @dataclass(eq=False)
 class ComposeView:
     """The view of the Compose tool."""
 
     is_bare: bool = False  # the background alone, without the objects
     drag: Composed = Composed.REPAIR
+    is_painting: bool = False  # on the object, where the whole picture is shown
+    paint_with: PaintWith = PaintWith.COLOUR
+    ink: tuple[float, float, float] = (0.8, 0.1, 0.1)  # sRGB
+    strength: float = 1.0  # in [0, 1], of the paint
+    source: tuple[float, float] | None = None  # image px: from where is cloned
 
 
 @dataclass(eq=False)

@@ -48,7 +48,7 @@ PARTS = ("arap.js", "splat.vert", "splat.frag", "resolve.frag", "view.js")
 def encode_page(document: Document, index: int) -> bytes:
     """Return the page in which object `index` can be dragged; the others are as they were left."""
     item, photo = document.objects[index], document.photo
-    lifted, matte = item.lifted, item.matte
+    lifted, matte = item.shown, item.matte
     assert lifted is not None and matte is not None, "the caller checks"
     scale = min(LONGEST / max(photo.size), 1.0)
     width, height = (max(round(side * scale), 1) for side in photo.size)
@@ -59,7 +59,7 @@ def encode_page(document: Document, index: int) -> bytes:
     about, data = _packed(arrays)
     about |= _places(document, index, puppet, scale)
     side = tuple(max(round(n * scale), 1) for n in reversed(matte.alpha.shape))
-    foreground = np.rint(np.clip(resized(matte.foreground, *side), 0, 1) * 255).astype(np.uint8)
+    foreground = np.rint(np.clip(resized(matte.shown, *side), 0, 1) * 255).astype(np.uint8)
     alpha = np.rint(np.clip(resized(matte.alpha, *side), 0, 1) * 255).astype(np.uint8)
     plate = resized(to_u8(_background(document, index)), width, height)
     values = {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from objectmorpher_core.base.arrays import F64
 
-from ..editor.view import Composed, Painted
+from ..editor.view import Composed, Painted, PaintWith
 from ..system.texts import t
 from .pointer import Button, Pointer, PointerShape, Stroke, ignore
 
@@ -92,13 +92,21 @@ def erases(editor: Editor, pointer: Pointer) -> bool:
 
 
 class ComposeTool:
-    """While the background is shown alone: left repairs it, right or Alt restores the photo.
+    """While one paints on the object: left paints, right or Alt erases, Ctrl says with what.
+
+    While the background is shown alone: left repairs it, right or Alt restores the photo.
 
     Or left drags from where it is to be taken to where it is wanted, right or Alt forgets that.
     """
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         is_other = pointer.alt or pointer.button is Button.RIGHT
+        if editor.view.compose.is_painting:
+            if pointer.ctrl:
+                editor.painting.pick(pointer.xy)
+                return ignore()
+            is_begun = editor.painting.start_stroke(pointer.xy, is_other)
+            return _paint(editor.painting, pointer) if is_begun else ignore()
         if not editor.view.compose.is_bare:
             editor.say(t("Press B to see the background alone, then paint on it"))
             return ignore()
@@ -120,10 +128,17 @@ class ComposeTool:
             editor.hinting.drop()
 
     def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
-        is_painting = editor.view.compose.is_bare and editor.is_on_photo(pointer.xy)
+        view = editor.view.compose
+        is_painting = (view.is_bare or view.is_painting) and editor.is_on_photo(pointer.xy)
         return PointerShape.CROSS if is_painting else PointerShape.ARROW
 
     def hint(self, editor: Editor) -> str:
+        if editor.view.compose.is_painting:
+            if editor.hand.is_busy:
+                return t("Esc cancels the stroke")
+            if editor.view.compose.paint_with is PaintWith.CLONE:
+                return t("Ctrl-click where to clone from, then drag · Alt-drag erases · [ ] size")
+            return t("Drag paints · Alt-drag erases · Ctrl-click takes a colour · [ ] size")
         if not editor.view.compose.is_bare:
             return t("B shows the background alone, to repair it by painting")
         if editor.view.compose.drag is Composed.TAKE:

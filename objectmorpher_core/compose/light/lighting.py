@@ -68,11 +68,11 @@ NOTHING = Lit()
 def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
     """Return the texture of the object's Gaussians: straight colour and alpha on its crop.
 
-    Beside it lie the invented pictures of what was `lifted`, if there are any.
+    Beside it lie the invented pictures of what was `lifted`, if there are any; over both, paint.
     """
     sides = None if lifted is None else lifted.sides
     if sides is None or not sides.pixels.size:
-        return build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
+        return build_levels(matte.shown, matte.alpha, matte.left, matte.top)
     (x0, y0, x1, y1), (height, width) = matte.box, sides.pixels.shape[:2]
     left, top = min(x0, sides.left), min(y0, sides.top)
     shape = max(y1, sides.top + height) - top, max(x1, sides.left + width) - left
@@ -94,7 +94,10 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
     first = max(near - (y0 - top), 0), max(near - (x0 - left), 0)
     size = foreground[around].shape
     foreground[around] = own[first[0] :, first[1] :][: size[0], : size[1]]
-    return build_levels(np.asarray(foreground, np.float32), alpha, left, top)
+    foreground = np.asarray(foreground, np.float32)
+    if matte.paint is not None:
+        foreground = matte.paint.over(foreground, left, top)
+    return build_levels(foreground, alpha, left, top)
 
 
 class Lighting:

@@ -199,7 +199,7 @@ def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
 
     Raises SplatFileError where it has no surface.
     """
-    lifted, matte = thing.lifted, thing.matte
+    lifted, matte = thing.shown, thing.matte
     assert lifted is not None, "the caller checks"
     body = lifted.body
     points, triangles = surface_of(body)
@@ -262,7 +262,7 @@ def _places_in(matte: Matte, px: F64) -> F64:
 
 
 def _texture(matte: Matte) -> bytes:
-    pixels = at_most(np.rint(np.clip(matte.foreground, 0, 1) * 255).astype(np.uint8), TEXTURE_SIDE)
+    pixels = at_most(np.rint(np.clip(matte.shown, 0, 1) * 255).astype(np.uint8), TEXTURE_SIDE)
     return encode_picture(Picture(to_u8(pixels)), ".jpg")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ WIDTH, HEIGHT = 320, 120
 LEFT, RIGHT = 60.0, 260.0  # px, the discs' middles
 RADIUS = 26.0
 ACROSS = 180.0  # px, a move that takes one disc over half of the other
+HORIZON, EYE = 20.0, 90.0  # px: a ground as it is seen, below it at a distance of 1
 ROUNDING = 2  # of 255: a soft edge mixed anew
 
 
@@ -105,10 +107,57 @@ def test_the_edge_of_an_object_at_rest_is_kept_beside_a_hole():
     assert np.array_equal(hidden[60, 80], [128, 128, 128])
 
 
-def test_a_copy_moved_aside_is_in_front_of_what_it_is_a_copy_of():
+def test_a_copy_moved_aside_is_in_front_of_what_it_is_a_copy_of_and_moved_up_behind():
     document = edits.duplicate(_two_discs(), 0)
-    for move in ((20.0, 0.0), (-13.7, 5.1), (3.3, -9.9)):
+    for move in ((20.0, 0.0), (-13.7, 5.1)):
         assert _order(_moved(document, 2, Placement(move=move)))[-1] == 2
+    assert _order(_moved(document, 2, Placement(move=(3.3, -9.9))))[-1] == 0
+
+
+def test_of_two_things_on_one_ground_the_nearer_is_in_front_whatever_their_lifts_say():
+    """Of any size, anywhere on it: the depth that a placement says beside them is a convention."""
+    rng, document = np.random.default_rng(5), _two_discs()
+    assert document.objects[0].lifted is not None
+    unit = document.objects[0].lifted.diameter * document.objects[0].lifted.scale
+    depth = document.objects[0].lifted.centre[2]
+    seen = 0
+    for _ in range(60):
+        away, size = rng.uniform(1, 4, 2), rng.uniform(0.3, 3, 2)
+        if abs(1 / away[0] - 1 / away[1]) * EYE < 0.06 * RADIUS * (size / away).max():
+            continue  # as far as a foot is told from a control point
+        for k, middle in enumerate((LEFT, RIGHT)):
+            to = np.array([rng.uniform(0, WIDTH), HORIZON + (EYE - RADIUS * size[k]) / away[k]])
+            further = rng.uniform(-0.5, 2.0)
+            scale = size[k] / away[k] * (1 + further * unit / depth)
+            move = float(to[0] - middle), float(to[1] - HEIGHT / 2)
+            place = Placement(move=move, depth=float(further), scale=float(scale))
+            document = _moved(document, k, place)
+        order, far = _order(document), int(away[1] > away[0])
+        assert order == [far, 1 - far], (away, size)
+        seen += 1
+    assert seen > 40
+
+
+def test_a_copy_dragged_past_another_changes_places_with_it_once():
+    document = _moved(edits.duplicate(_two_discs(), 0), 2, Placement(scale=0.5))
+    orders = [
+        tuple(_order(_moved(document, 2, Placement((0.2 * step, float(step)), scale=0.5))))
+        for step in range(-8, 40, 2)
+    ]
+    assert (orders[0], orders[-1]) == ((2, 0), (0, 2))
+    assert sum(a != b for a, b in pairwise(orders)) == 1
+
+
+def test_what_floats_as_the_artist_says_is_in_front_by_its_depth():
+    document = _two_discs()
+    float_up = replace(document.objects[0].shape, is_standing=False)
+    objects = tuple(replace(item, shape=float_up) for item in document.objects)
+    for depth, order in ((-0.1, [1, 0]), (0.1, [0, 1])):
+        for up in (-20.0, 20.0):
+            place = Placement(move=(ACROSS, up), depth=depth)
+            assert _order(_moved(replace(document, objects=objects), 0, place)) == order
+            first = replace(document, objects=(objects[0], document.objects[1]))
+            assert _order(_moved(first, 0, place)) == order, "also where the other one stands"
 
 
 # ---- putting in order -----------------------------------------------------------------------
@@ -122,7 +171,7 @@ def test_any_order_can_be_had_whatever_the_depths(order: list[int]):
     posed = {k: _posed(document, k) for k in range(3)}
     for k in range(3):
         changed = reordered(document, k, order, posed.__getitem__)
-        assert back_to_front(changed.objects, posed) == order
+        assert back_to_front(changed, posed) == order
 
 
 def test_putting_back_the_order_of_depth_needs_no_layers():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ from ...worker.job_functions import BackendChoice, Variant
 from ...worker.requests import JobError
 from ..feedback import Action
 from ..tasks import PLATE
-from ..view import ToolName
+from ..view import ToolName, ViewState
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import PlatePatch
@@ -117,7 +117,7 @@ class Composing:
     def toggle_bare(self) -> None:
         """Shows the background alone, or the whole picture."""
         view = self._editor.view
-        view.compose.is_bare = not view.compose.is_bare
+        view.compose.is_bare, view.compose.is_painting = not view.compose.is_bare, False
 
     @property
     def inpainter(self) -> str:
@@ -308,24 +308,11 @@ class Composing:
 
     def painted_layer(self) -> CanvasLayer | None:
         """Return the painted area that is not filled in yet, as a tint over the canvas."""
-        view = self._editor.view
         strokes = [s for s in (self._stroke, *self._waiting) if s is not None]
         if not strokes:
             return None
-        size = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
-        step = GRAIN / view.zoom  # photo px per px of the tint
-        start = (view.left + step / 2 - 0.5, view.top + step / 2 - 0.5)
-        matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        covered = np.zeros(size[::-1], np.float32)
-        for stroke in strokes:
-            shown = cv2.warpAffine(stroke.coverage, matrix, size, flags=flags)
-            np.maximum(covered, shown, out=covered)
         is_white = self._is_restoring and self._stroke is not None
-        ink = np.array(RESTORING if is_white else FILLING, np.float32)
-        rgba = np.dstack([covered[..., None] * ink, covered * 255]).astype(np.uint8)
-        box = (0.0, 0.0, float(size[0] * GRAIN), float(size[1] * GRAIN))
-        return CanvasLayer(box, rgba, is_coarse=True, is_tint=True)
+        return stroke_tint(self._editor.view, strokes, RESTORING if is_white else FILLING)
 
     # Joining the object to it
 
@@ -482,6 +469,25 @@ class Composing:
             editor.preview = change(editor.committed, editor.current)
         except ValueError as error:
             editor.complain(str(error))
+
+
+def stroke_tint(
+    view: ViewState, strokes: Sequence[Stroke], colour: tuple[int, int, int]
+) -> CanvasLayer:  # fmt: skip
+    """What strokes cover, as a tint of the levels `colour` over the canvas."""
+    size = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
+    step = GRAIN / view.zoom  # photo px per px of the tint
+    start = (view.left + step / 2 - 0.5, view.top + step / 2 - 0.5)
+    matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    covered = np.zeros(size[::-1], np.float32)
+    for stroke in strokes:
+        shown = cv2.warpAffine(stroke.coverage, matrix, size, flags=flags)
+        np.maximum(covered, shown, out=covered)
+    ink = np.array(colour, np.float32)
+    rgba = np.dstack([covered[..., None] * ink, covered * 255]).astype(np.uint8)
+    box = (0.0, 0.0, float(size[0] * GRAIN), float(size[1] * GRAIN))
+    return CanvasLayer(box, rgba, is_coarse=True, is_tint=True)
 
 
 def _nothing() -> None:

@@ -210,7 +210,7 @@ class Objects:
         if len(there) < 2:
             return there
         posed = partial(self._editor.derived.posed, document)
-        return back_to_front(objects, {k: None if k in fronts else posed(k) for k in there})
+        return back_to_front(document, {k: None if k in fronts else posed(k) for k in there})
 
     def listed(self) -> list[int]:
         """Return all selected objects in a list's order: the front one first."""

@@ -14,6 +14,7 @@ from ..widgets.theme import theme
 from .canvas import ACCENT, WHITE, CanvasPainter
 
 BARB = 10.0  # points, of an arrow
+SOURCE = 6.0  # points, radius of the mark from where is cloned
 
 
 def draw_compose(canvas: CanvasPainter) -> None:
@@ -22,6 +23,12 @@ def draw_compose(canvas: CanvasPainter) -> None:
     if (offer := editor.composing.offer) is not None:
         for outline in editor.derived.contours(offer.outlined):
             canvas.dashes(canvas.at(outline))
+    if editor.view.compose.is_painting:
+        if editor.pointer is not None and editor.is_on_photo(editor.pointer.xy):
+            canvas.brush(editor.pointer.alt)
+        if (source := editor.painting.source) is not None:
+            canvas.circle(canvas.at(np.array([source]))[0], theme.pt(SOURCE), ACCENT)
+        return
     if not editor.view.compose.is_bare:
         _draw_owner(canvas)
         return

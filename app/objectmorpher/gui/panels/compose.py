@@ -28,7 +28,7 @@ from objectmorpher_core.document.settings import (
 from ...commands import run
 from ...commands.compose import not_moved
 from ...editor.editor import Editor
-from ...editor.view import Composed
+from ...editor.view import Composed, PaintWith
 from ...system.texts import sentence, t
 from ...tools.place_tool import wrapped
 from ...worker.job_functions import Variant
@@ -69,6 +69,8 @@ def draw_compose(editor: Editor) -> None:
         note(t("Lift an object first."))
         return
     _draw_background(editor)
+    rule()
+    _draw_paint(editor)
     rule()
     _draw_finish(editor)  # before those to which it adds fields
     rule()
@@ -295,6 +297,31 @@ def _draw_finish(editor: Editor) -> None:
         preview(replace(finish, blend_mode=mode))
         editor.commit(t("Blend mode"))
     note(t("Exposure in stops; warmth from blue to amber; blur in pixels of the photo."))
+
+
+def _draw_paint(editor: Editor) -> None:
+    heading(t("Paint"))
+    view = editor.view.compose
+    is_painting = checkbox(t("Paint on the object"), view.is_painting)
+    tooltip(t("What you paint sticks to the object, on its photo and on its invented sides"))
+    if is_painting != view.is_painting:
+        run(editor, "paint")
+    if view.is_painting:
+        choices = tuple(Segment(way, t(way.value)) for way in PaintWith)
+        view.paint_with = segmented("paint with", choices, view.paint_with)
+        if view.paint_with is PaintWith.COLOUR:
+            imgui.set_next_item_width(-1)
+            _, (r, g, b) = imgui.color_edit3("##ink", list(view.ink))
+            mark(t("Colour"))
+            view.ink = float(r), float(g), float(b)
+            note(t("Ctrl-click takes a colour from the picture."))
+        else:
+            note(t("Ctrl-click where to clone from, then paint."))
+        number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, 100.0, 1.0, 100.0)
+        view.strength = number_field(number, 100 * view.strength).value / 100
+        draw_brush_fields(editor)
+        note(t("Alt or right-drag erases paint."))
+    command_button(editor, "unpaint", width=-1)
 
 
 def _draw_edge(editor: Editor) -> None:

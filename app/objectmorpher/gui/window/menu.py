@@ -81,7 +81,8 @@ MENUS: dict[str, tuple[str, ...]] = {
     "Object": (
         "lift", "import_shape", "fit_again", "-", "rename", "duplicate", "lock", "remove_object",
         "-", "keep_in_front", "forward", "backward", "to_front", "to_back", "-", "ground", "-",
-        "bare", "take_from", "forget_sources", "fill_again", "shadow", "take_shadow", "depth",
+        "paint", "unpaint", "-", "bare", "take_from", "forget_sources", "fill_again", "shadow",
+        "take_shadow", "depth",
     ),
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),
     "View": (

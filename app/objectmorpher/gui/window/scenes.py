@@ -39,7 +39,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     if editor.looking.orbit is not None and not view.is_before:
         return _alone(editor, document, renderer)
     if view.is_before or (not is_edited and shown in (Shown.COMPOSITE, Shown.PROVENANCE)):
-        return Scene(photo, surround)
+        tint = editor.painting.painted_layer()
+        return Scene(photo, surround, layers=() if tint is None else (tint,))
     if shown is Shown.DEPTH and editor.preview is None:
         editor.cache.painter.measure(document)
     split = view.split or 0.0
@@ -55,6 +56,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     if renderer == "gl":
         layers, objects = (), (*splat_objects(document, frame), *frame.refined)
     if is_selecting and (tint := editor.shaping.painted_layer()) is not None:
+        layers = (*layers, tint)
+    if (tint := editor.painting.painted_layer()) is not None:
         layers = (*layers, tint)
     return Scene(
         photo, surround, frame.plate, frame.shades, layers, objects, mask,
