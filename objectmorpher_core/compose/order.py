@@ -11,6 +11,7 @@ import numpy as np
 from ..base.arrays import F64, Mask
 from ..base.camera import Camera
 from ..document.model import Document, EditObject, Matte
+from ..document.placement import down_of
 from ..raster.posed import PosedSplats
 from .plate.plate import hole_margin
 
@@ -20,6 +21,7 @@ ALONG = 0.1  # of a side's length, from which it is touched
 SHADOW = 0.5  # x an object's size, how far the edge of its shadow reaches
 EDGE = 4.0  # x the spacing of the Gaussians, how far an object reaches around their means
 DIGITS = 2  # of a row: what differs less is alike
+FLAT = 0.3  # x its width, that what lies flat is high at most
 LEAST_BELOW = 0.1  # x the photo's height, from the horizon down to what stands
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 px of the photo
 Posed = Callable[[int], PosedSplats]
@@ -84,7 +86,8 @@ def _hidden(mask: Mask, splats: PosedSplats, camera: Camera) -> float:
 def back_to_front(document: Document, splats: Mapping[int, PosedSplats | None]) -> list[int]:
     """Return the keys of `splats` by layer, and within a layer by where they stand.
 
-    The nearer is in front: what stands lower in the picture. Of two alike the later is in front: a
+    The nearer is in front: what stands lower in the picture; on what lies flat, as a plate, it is
+    in front of that, too. Of two alike the later is in front: a
     copy that was moved aside. What has no Gaussians, for it was told to stay in front, is the
     nearest.
     """
@@ -114,8 +117,21 @@ def _rows(document: Document, splats: Mapping[int, PosedSplats | None]) -> dict[
             middle = max(float(np.median(own.nodes[:, 2])), 1e-9)
             rows[k] = round(ground + below * (depth / middle - 1), DIGITS)
         else:
-            rows[k] = round(_foot(own.nodes, camera), DIGITS)
+            is_flat = _lies_flat(objects[k], document, own.nodes)
+            edge = _far_edge if is_flat else _foot  # what stands on a plate is in front of it
+            rows[k] = round(edge(own.nodes, camera), DIGITS)
     return rows
+
+
+def _lies_flat(item: EditObject, document: Document, nodes: F64) -> bool:
+    """Whether it is known to lie as a plate does; `nodes` (N, 3) world are its points."""
+    down = None if item.lifted is None else down_of(item, document)
+    if down is None:
+        return False
+    around = (nodes - nodes.mean(0)) - np.outer((nodes - nodes.mean(0)) @ down, down)
+    widths = np.sqrt(np.linalg.eigvalsh(around.T @ around / len(nodes))[1:])
+    height = float((nodes @ down).std())
+    return height < FLAT * float(widths[0])
 
 
 def _floats(item: EditObject) -> bool:
@@ -128,6 +144,13 @@ def _foot(nodes: F64, camera: Camera) -> float:
     if (nodes[:, 2] <= 0).any():
         return np.inf
     return float(camera.project(nodes)[:, 1].max())
+
+
+def _far_edge(nodes: F64, camera: Camera) -> float:
+    """Px: the highest row in which one of the points (N, 3) is seen; inf around the camera."""
+    if (nodes[:, 2] <= 0).any():
+        return np.inf
+    return float(camera.project(nodes)[:, 1].min())
 
 
 def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) -> Document:

@@ -148,6 +148,25 @@ def test_a_copy_dragged_past_another_changes_places_with_it_once():
     assert sum(a != b for a, b in pairwise(orders)) == 1
 
 
+def test_what_stands_on_a_plate_is_in_front_of_it_and_what_stands_beyond_it_behind():
+    document = _two_discs()
+    thing, up = document.objects[0], np.array([0.0, -0.6, -0.8])
+    assert thing.lifted is not None
+    nodes = thing.lifted.control_points.astype(np.float64)
+    flat = nodes - 0.9 * np.outer((nodes - nodes.mean(0)) @ up, up)
+    plate = replace(thing.lifted, control_points=flat, up=tuple(up))
+    document = document.with_object(0, replace(thing, lifted=plate))
+    document = _moved(document, 0, Placement(scale=1.001))  # it was touched
+    rows = document.photo.camera.project(plate.world_points(flat))[:, 1]
+    small = 0.3
+    for foot in np.linspace(rows.min() - 12, rows.max() + 12, 9):
+        down = float(foot - small * RADIUS - HEIGHT / 2)
+        move = Placement(move=(LEFT - RIGHT, down), scale=small)
+        order = _order(_moved(document, 1, move))
+        if abs(foot - rows.min()) > 2:  # as far as a foot is told from a control point
+            assert order == ([0, 1] if foot > rows.min() else [1, 0]), (foot, rows.min())
+
+
 def test_what_floats_as_the_artist_says_is_in_front_by_its_depth():
     document = _two_discs()
     float_up = replace(document.objects[0].shape, is_standing=False)
