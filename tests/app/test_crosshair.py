@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from editor_steps import CENTRE, wait_for_jobs
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.shortcuts import Shortcuts
 from objectmorpher.editor.view import ToolName
 from objectmorpher.gui.window.input import Input
+from objectmorpher.gui.window.layout import Rect
 from objectmorpher.tools.pose_strokes import DEPTH_STEP
 from objectmorpher_core.document.model import Document
 
@@ -93,3 +95,33 @@ def test_page_keys_move_in_depth_and_undo_is_one_step(
     for _ in range(3):
         editor.undo()
     assert editor.placing.placement.is_identity
+
+
+def test_a_stroke_goes_on_from_where_the_mouse_left_the_window(
+    keys: Input, editor: Editor, ball: Document
+) -> None:
+    """ImGui then says that it is at minus 3e38, of which a tool makes numbers that are none."""
+    editor.start(ball)
+    editor.view.tool = ToolName.PLACE
+    imgui.create_context()
+    try:
+        io = imgui.get_io()
+        io.set_ini_filename("")
+        io.display_size = imgui.ImVec2(editor.view.width, editor.view.height)
+        io.backend_flags |= imgui.BackendFlags_.renderer_has_textures.value
+        middle = editor.view.canvas_from_image(np.array([90.0, 60.0]))
+        rect = Rect(0.0, 0.0, editor.view.width, editor.view.height)
+        for place in (middle, middle + 1, middle + 40, np.full(2, -float(np.finfo("f4").max))):
+            io.add_mouse_pos_event(*place)
+            io.add_mouse_button_event(0, place is not middle)
+            for _ in range(2):
+                imgui.new_frame()
+                keys.update(editor, rect, 1.0)
+                imgui.end_frame()
+            if place[0] > 0 and place is not middle:
+                before = editor.placing.placement
+        assert editor.hand.is_busy
+        assert before is not None and before.move[0] > 5
+        assert editor.placing.placement == before
+    finally:
+        imgui.destroy_context()

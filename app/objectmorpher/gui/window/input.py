@@ -123,6 +123,7 @@ class Input:
         self.crosshair, self.focus = Crosshair(), KeyboardFocus()
         self._waiting: list[tuple[int, str]] = []  # ImGui's number of the event, and the chord
         self._pressed: list[str] = []  # chords since the last frame, in their order
+        self._mouse = 0.0, 0.0  # where it was last, window units
         self._last: tuple[float, float] | None = None
         self._has_popup = False  # in the last frame
         self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
@@ -130,17 +131,20 @@ class Input:
     def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
         """`rect`: the canvas, window units; `ratio`: canvas px per window unit."""
         io = imgui.get_io()
-        mouse = io.mouse_pos
+        has_mouse = imgui.is_mouse_pos_valid()  # else it has left, and is at minus 3e38
+        if has_mouse:
+            self._mouse = io.mouse_pos.x, io.mouse_pos.y
+        x, y = self._mouse
         is_mouse_used = any(io.mouse_down) or io.mouse_wheel != 0
-        self.crosshair.follow_mouse((mouse.x, mouse.y), is_mouse_used)
+        self.crosshair.follow_mouse((x, y), is_mouse_used)
         if editor.document is None:
             self.crosshair.hide()
         self.crosshair.is_down &= editor.hand.is_busy
         self.focus.check(editor)
         self._run_keys(editor)
         pointer = Pointer(
-            (mouse.x - rect.x) * ratio,
-            (mouse.y - rect.y) * ratio,
+            (x - rect.x) * ratio,
+            (y - rect.y) * ratio,
             is_down=True,
             shift=io.key_shift,
             alt=io.key_alt,
@@ -148,7 +152,7 @@ class Input:
             space=imgui.is_key_down(imgui.Key.space),
             wheel=io.mouse_wheel,
         )
-        is_over = rect.contains(mouse.x, mouse.y) and not io.want_capture_mouse
+        is_over = has_mouse and rect.contains(x, y) and not io.want_capture_mouse
         if self.crosshair.is_shown:
             pointer, is_over = self.crosshair.pointer(), not imgui.is_popup_open("", ANY_POPUP)
         with _guarded(editor):
