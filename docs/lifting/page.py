@@ -126,11 +126,10 @@ does, about its own upright. Wobble is that of the turned outline over that at r
 ![Sixteen photos, turned by 15, 25 and 35 degrees to both sides and pitched by 20](turned.jpg)
 """
 LOOKED = """\
-Each picture was looked at. Up to 25 degrees the flower, the rocket, the bowl, the coins and the
-logo look right, the astronaut and the coffee nearly so: her head is a little deep, and what is not
-shown of her neck is uneven; the coffee's handle and spoon lie flat on the saucer, the upper
-end of the spoon's bowl is smeared where it covers the cup, and what turns into view of the cup's
-side is blurred. The horse is a sheet, as it was drawn. What does not look right: the invented fur
+Each picture was looked at. The coffee spins on its table, which holds up to 35 degrees; at the cup's
+limb are jags, and a nib where the spoon touches the lip; its handle and spoon lie flat on the
+saucer. Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right, the
+astronaut nearly so: her head is a little deep, and what is not shown of her neck is uneven. The horse is a sheet, as it was drawn. What does not look right: the invented fur
 along the cat's cheek is a little darker than the fur beside it, and that at the upper left is
 coarse; the fig in the bowl becomes narrow, and slides at 35, where a strand stands off the bowl's
 edge; the photographer's back has a grey band; the clock, which is blurred, has a double edge, and

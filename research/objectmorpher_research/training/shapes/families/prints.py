@@ -266,7 +266,7 @@ def _leaf(rng: Rng) -> _Drawn:
     middle = (0.5 * SIDE - 0.5, 0.5 * SIDE - 0.5)
     matrix = cv2.getRotationMatrix2D(middle, degrees, 1.0)
     picture = cv2.warpAffine(drawn.picture, matrix, (SIDE, SIDE), borderMode=cv2.BORDER_REFLECT)
-    return _Drawn(outline @ spin.T, picture)
+    return _Drawn(outline @ spin.T, np.asarray(picture, np.float32))
 
 
 def _coin(rng: Rng) -> _Drawn:
@@ -323,7 +323,8 @@ def _card(rng: Rng) -> _Drawn:
 def _cut_out(rng: Rng) -> _Drawn:
     """A photograph along some outline, now and then with a pale border."""
     outline = pick(rng, (_blob(rng), _blob(rng, 9, 18), _star(rng), _heart(), _fish(rng)))
-    canvas = _Canvas(cv2.resize(a_crop(rng), (SIDE, SIDE), interpolation=cv2.INTER_AREA))
+    photo = cv2.resize(a_crop(rng), (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+    canvas = _Canvas(np.asarray(photo, np.float32))
     if chance(rng, 0.3):
         canvas.line(outline, span(rng, 0.04, 0.15), np.full(3, span(rng, 0.6, 0.95)), True)
     return canvas.done(rng, outline)
