@@ -126,17 +126,17 @@ does, about its own upright. Wobble is that of the turned outline over that at r
 ![Sixteen photos, turned by 15, 25 and 35 degrees to both sides and pitched by 20](turned.jpg)
 """
 LOOKED = """\
-Each picture was looked at. The coffee spins on its table, which holds up to 35 degrees; at the cup's
-limb are jags, and a nib where the spoon touches the lip; its handle and spoon lie flat on the
+Each picture was looked at. The coffee spins on its table, which holds up to 35 degrees; at the
+cup's limb are jags, and a nib where the spoon touches the lip; its handle and spoon lie flat on the
 saucer. Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right, the
-astronaut nearly so: her head is a little deep, and what is not shown of her neck is uneven. The horse is a sheet, as it was drawn. What does not look right: the invented fur
-along the cat's cheek is a little darker than the fur beside it, and that at the upper left is
-coarse; the fig in the bowl becomes narrow, and slides at 35, where a strand stands off the bowl's
-edge; the photographer's back has a grey band; the clock, which is blurred, has a double edge, and
-the cell, which is blurred too, a hard one where its side turns into view; the colour ball is black
-on black at the frame, and has nicks and specks there; the pagoda leans, becomes narrow at 35, and
-shows light spots at its left windows; of the moon a piece of ground is selected, which has a ragged
-edge.
+astronaut nearly so: her head is a little deep, and what is not shown of her neck is uneven. The
+horse is a sheet, as it was drawn. What does not look right: the invented fur along the cat's cheek
+is a little darker than the fur beside it, and that at the upper left is coarse; the fig in the bowl
+becomes narrow, and slides at 35, where a strand stands off the bowl's edge; the photographer's back
+has a grey band; the clock, which is blurred, has a double edge, and the cell, which is blurred too,
+a hard one where its side turns into view; the colour ball is black on black at the frame, and has
+nicks and specks there; the pagoda leans, becomes narrow at 35, and shows light spots at its left
+windows; of the moon a piece of ground is selected, which has a ragged edge.
 """
 STEREO = """## A photographed thing whose shape is known
 
