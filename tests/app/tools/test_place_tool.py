@@ -409,3 +409,24 @@ def test_what_the_object_moves_over_is_undone_and_delete_takes_the_object(placed
     assert why_not(placed, "remove_handle") is None
     run(placed, "remove_handle")
     assert placed.document is not None and placed.document.objects == ()
+
+
+def test_yaw_goes_about_what_the_artist_says_is_upright(
+    placed: Editor,
+) -> None:
+    usual = placed.placing.seen_from
+    placed.placing.look_down(50.0)
+    placed.commit("Set what is upright")
+    assert placed.placing.seen_from == 50.0
+    assert placed.placing.usual_seen_from == usual
+    before = placed.placing.gimbal.down
+    start = placed.placing.placement
+    assert start is not None
+    yaw, pitch, roll = placed.placing.angles
+    placed.placing.move_to(placed.placing.turned_to(start, (yaw + 30, pitch, roll)))
+    np.testing.assert_allclose(placed.placing.angles, (yaw + 30, pitch, roll), atol=EXACT)
+    np.testing.assert_allclose(placed.placing.gimbal.down, before)
+    placed.commit("Turn object")
+    placed.undo()
+    placed.undo()
+    assert placed.placing.seen_from == usual

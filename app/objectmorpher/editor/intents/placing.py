@@ -10,7 +10,7 @@ import numpy as np
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import EditObject, LiftedObject, Placement
+from objectmorpher_core.document.model import LiftedObject, Placement
 from objectmorpher_core.document.placement import (
     Ground,
     HeldPoint,
@@ -62,19 +62,20 @@ class Placing:
     @property
     def seen_from(self) -> float:
         """From how many degrees above one looks down on the current object, at rest."""
-        return self._looking_down(self._editor.object)
+        thing = self._editor.object
+        told = None if thing is None else thing.seen_from
+        return self.usual_seen_from if told is None else told
 
     @property
     def usual_seen_from(self) -> float:
-        """The same, as it is seen to stand."""
-        thing = self._editor.object
-        return self._looking_down(thing and replace(thing, seen_from=None))
-
-    def _looking_down(self, thing: EditObject | None) -> float:
-        document = self._editor.document
-        assert document is not None and thing is not None and thing.lifted is not None
-        down = gimbal_of(thing, document).down
+        """The same, as it is seen to stand, whatever the artist says."""
+        document, k = self._editor.document, self._editor.current
+        assert document is not None and document.objects[k].lifted is not None
+        document = edits.set_seen_from(document, k, None)
+        thing = document.objects[k]
+        assert thing.lifted is not None
         way = thing.lifted.centre / np.linalg.norm(thing.lifted.centre)
+        down = gimbal_of(thing, document).down
         return float(np.degrees(np.arcsin(np.clip(way @ down, 0.0, 1.0))))
 
     def look_down(self, degrees: float | None) -> None:
