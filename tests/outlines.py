@@ -6,9 +6,9 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.compose.shadow.shadow import StandingObject, ground_normal
+from objectmorpher_core.compose.shadow.shadow import StandingObject
 from objectmorpher_core.compose.silhouette import Silhouette, fine_grid
-from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.placement import ground_normal
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels
@@ -37,7 +37,7 @@ def upright(mask: Mask, camera: Camera, ground: float, across: int = 60) -> F64:
         np.arange(columns[0], columns[-1] + 1, step), np.arange(rows[0], rows[-1] + 1, step)
     )
     x, y = (v[mask[y.astype(int), x.astype(int)]] for v in (x, y))
-    normal = ground_normal(camera, None, Shadow(ground=ground), float(rows[-1]))
+    normal = ground_normal(camera, None, ground, float(rows[-1]))
     foot = camera.unproject(np.array([camera.cx, rows[-1] + 1.0]), DISTANCE)
     rays = camera.unproject(np.column_stack([x, y]), np.ones(len(x)))
     facing = np.cross([1.0, 0.0, 0.0], normal)  # across the board
@@ -47,5 +47,5 @@ def upright(mask: Mask, camera: Camera, ground: float, across: int = 60) -> F64:
 def standing(mask: Mask, camera: Camera, ground: float = 20.0) -> StandingObject:
     """Such a board."""
     rows = np.flatnonzero(mask.any(1))
-    normal = ground_normal(camera, None, Shadow(ground=ground), float(rows[-1]))
+    normal = ground_normal(camera, None, ground, float(rows[-1]))
     return StandingObject(upright(mask, camera, ground), normal, camera)

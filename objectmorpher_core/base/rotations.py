@@ -181,14 +181,15 @@ class Gimbal:
             pitch = float(np.arctan2(there[2], sign * level)) - lean
             roll = float(np.arctan2(sign * there[1], sign * there[0])) - start
             roll = roll if level > 1e-9 else 0.0
-            found.append((_wrapped(np.degrees(pitch)), _wrapped(np.degrees(roll))))
+            found.append((wrapped(np.degrees(pitch)), wrapped(np.degrees(roll))))
         pitch, roll = min(found, key=lambda pair: abs(pair[0]) + abs(pair[1]))
         spun = self.carried(pitch, roll).T @ matrix
         yaw = turn_about(vector_from_matrix(spun), self.down)
-        return _wrapped(np.degrees(yaw)), pitch, roll
+        return wrapped(np.degrees(yaw)), pitch, roll
 
 
-def _wrapped(degrees: float) -> float:
+def wrapped(degrees: float) -> float:
+    """Return the same direction in (-180, 180] degrees."""
     return float(180.0 - (180.0 - degrees) % 360.0)
 
 

@@ -357,9 +357,7 @@ def _at_rest(thing: Moved, rows: Rows) -> Rows:
     )
 
 
-def _with(
-    thing: Moved, drawn: Picture3D, above: int, paint: F32 | None, rows: Rows
-) -> Rows:  # fmt: skip
+def _with(thing: Moved, drawn: Picture3D, above: int, paint: F32 | None, rows: Rows) -> Rows:
     """`rows` with an object over them whose picture `drawn` begins at row `above`.
 
     `paint` (h, w) is how much of that was painted.

@@ -86,11 +86,12 @@ def _hidden(mask: Mask, splats: PosedSplats, camera: Camera) -> float:
 def back_to_front(document: Document, splats: Mapping[int, PosedSplats | None]) -> list[int]:
     """Return the keys of `splats` by layer, and within a layer by where they stand.
 
-    The nearer is in front: what stands lower in the picture; on what lies flat, as a plate, it is
-    in front of that, too. Of two alike the later is in front: a
-    copy that was moved aside. What has no Gaussians, for it was told to stay in front, is the
-    nearest.
+    The nearer is in front: what stands lower in the picture, and what stands on a plate is nearer
+    than that. Of two alike the later is in front: a copy that was moved aside. What has no
+    Gaussians, for it was told to stay in front, is the nearest.
     """
+    if len(splats) < 2:  # as in most drags
+        return list(splats)
     objects, rows = document.objects, _rows(document, splats)
     return sorted(splats, key=lambda k: (objects[k].layer, rows[k], k))
 
@@ -106,7 +107,7 @@ def _rows(document: Document, splats: Mapping[int, PosedSplats | None]) -> dict[
     ground, below, depth = 0.0, float(camera.height), 1.0
     if standing:
         nodes = standing[0].world_points(standing[0].control_points)
-        ground, depth = _foot(nodes, camera), float(np.median(nodes[:, 2]))
+        ground, depth = _row(nodes, camera, np.max), float(np.median(nodes[:, 2]))
         horizon = camera.height / 2 if document.horizon is None else document.horizon
         below = max(ground - horizon, LEAST_BELOW * camera.height)
     rows = {}
@@ -118,8 +119,8 @@ def _rows(document: Document, splats: Mapping[int, PosedSplats | None]) -> dict[
             rows[k] = round(ground + below * (depth / middle - 1), DIGITS)
         else:
             is_flat = _lies_flat(objects[k], document, own.nodes)
-            edge = _far_edge if is_flat else _foot  # what stands on a plate is in front of it
-            rows[k] = round(edge(own.nodes, camera), DIGITS)
+            # What stands on a plate is in front of it: that is where its far edge is.
+            rows[k] = round(_row(own.nodes, camera, np.min if is_flat else np.max), DIGITS)
     return rows
 
 
@@ -128,10 +129,11 @@ def _lies_flat(item: EditObject, document: Document, nodes: F64) -> bool:
     down = None if item.lifted is None else down_of(item, document)
     if down is None:
         return False
-    around = (nodes - nodes.mean(0)) - np.outer((nodes - nodes.mean(0)) @ down, down)
-    widths = np.sqrt(np.linalg.eigvalsh(around.T @ around / len(nodes))[1:])
-    height = float((nodes @ down).std())
-    return height < FLAT * float(widths[0])
+    own = nodes - nodes.mean(0)
+    heights = own @ down
+    around = own - np.outer(heights, down)
+    _, narrow, _ = np.sqrt(np.linalg.eigvalsh(around.T @ around / len(own)).clip(0))
+    return float(heights.std()) < FLAT * float(narrow)
 
 
 def _floats(item: EditObject) -> bool:
@@ -139,18 +141,11 @@ def _floats(item: EditObject) -> bool:
     return not (item.shape.is_standing or item.is_grounded)
 
 
-def _foot(nodes: F64, camera: Camera) -> float:
-    """Px: the lowest row in which one of the points (N, 3) is seen; inf around the camera."""
+def _row(nodes: F64, camera: Camera, end: Callable[[F64], float]) -> float:
+    """Px: the row at an `end` of those where points (N, 3) are seen; inf around the camera."""
     if (nodes[:, 2] <= 0).any():
         return np.inf
-    return float(camera.project(nodes)[:, 1].max())
-
-
-def _far_edge(nodes: F64, camera: Camera) -> float:
-    """Px: the highest row in which one of the points (N, 3) is seen; inf around the camera."""
-    if (nodes[:, 2] <= 0).any():
-        return np.inf
-    return float(camera.project(nodes)[:, 1].min())
+    return float(end(camera.project(nodes)[:, 1]))
 
 
 def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) -> Document:

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, F64, U8, Mask
+from ..base.arrays import F32, F64, Mask
 from ..base.camera import Camera
+from ..base.pixels import unit_pixels
 from ..document.model import LiftedObject, Matte
 from ..document.paint import Paint
 from ..raster import tiles
@@ -99,8 +100,8 @@ def with_stroke(
     old = matte.paint or Paint((), np.zeros((len(seen.spots), 4), np.uint8))
     box, sums = _on_texture(seen, values)
     spots = _sampled(values, seen.spots) * seen.is_seen[:, None]
-    rgba = _mixed(sums, _unit(old.crop(box)), opacity)
-    return _with_paint(matte, old, box, rgba, _mixed(spots, _unit(old.spots), opacity))
+    rgba = _mixed(sums, unit_pixels(old.crop(box)), opacity)
+    return _with_paint(matte, old, box, rgba, _mixed(spots, unit_pixels(old.spots), opacity))
 
 
 def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
@@ -108,7 +109,7 @@ def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
     if (old := matte.paint) is None:
         return matte
     box, sums = _on_texture(seen, coverage[..., None])
-    rgba, dots = _unit(old.crop(box)), _unit(old.spots)
+    rgba, dots = unit_pixels(old.crop(box)), unit_pixels(old.spots)
     rgba[..., 3] *= 1 - np.minimum(sums[..., 0], 1)
     dots[:, 3] *= 1 - _sampled(coverage, seen.spots) * seen.is_seen
     return _with_paint(matte, old, box, rgba, dots)
@@ -129,7 +130,7 @@ class PaintedShare:
         texture = object_texture(matte, splats.rest.lifted)
         height, width = texture.levels[0].shape[:2]
         left, top = int(texture.left), int(texture.top)
-        alpha = _unit(paint.crop((left, top, left + width, top + height))[..., 3:])
+        alpha = unit_pixels(paint.crop((left, top, left + width, top + height))[..., 3:])
         levels = build_levels(np.repeat(alpha, 3, axis=2), texture.levels[0][..., 3], left, top)
         spots = np.repeat(paint.spots[:, 3:] / np.float32(255), 3, axis=1)
         if len(spots) == len(splats):  # else some were split, whose paint is told with the texture
@@ -139,10 +140,6 @@ class PaintedShare:
     def draw(self, box: Box) -> F32:
         """(h, w) how much of each pixel is paint."""
         return tiles.draw(self.drawable, self.levels, box).color[..., 0].copy()
-
-
-def _unit(levels: U8) -> F32:
-    return np.asarray(levels / np.float32(255), np.float32)
 
 
 def _mixed(sums: F32, below: F32, opacity: float) -> F32:

@@ -56,29 +56,34 @@ def placement_of(motion: np.ndarray, lifted: LiftedObject, camera: Camera) -> Pl
     return with_centre(Placement(turn=turn_of(rotation), scale=scale), centre, lifted, camera)
 
 
-def seen_from_above(camera: Camera, degrees: float, row: float) -> F64:
-    """(3,) world, unit: down, where one looks down by `degrees` on what is seen at `row` px."""
-    tilt = float(np.radians(degrees) - np.arctan2(row - camera.cy, camera.focal))
+def ground_normal(
+    camera: Camera, horizon: float | None, seen_from: float | None, row: float
+) -> F64 | None:
+    """(3,) world, unit, down: of the ground on which an object stands that is seen at `row` px.
+
+    `seen_from`: degrees above it, from which one is said to look; else the photo's `horizon` says,
+    px of its row, where that is above the object. None: nothing is known.
+    """
+    if seen_from is not None:
+        tilt = float(np.radians(seen_from) - np.arctan2(row - camera.cy, camera.focal))
+    elif horizon is not None and row > horizon:
+        tilt = float(np.arctan2(camera.cy - horizon, camera.focal))
+    else:
+        return None
     return np.array([0.0, np.cos(tilt), np.sin(tilt)])
 
 
 def down_at(
     lifted: LiftedObject, camera: Camera, horizon: float | None, seen_from: float | None = None
 ) -> F64 | None:
-    """(3,) world, unit: what is down where an object stands at rest; None: nothing says so.
+    """(3,) world, unit: what is down where an object stands at rest; None: nothing is known.
 
-    `seen_from`: degrees above it, from which one is said to look; else its shape says how it
-    stands, else the photo's `horizon`, px of its row, where that is above it.
+    What its shape says counts more than the horizon, and what one is told more than both.
     """
-    row = float(camera.project(lifted.centre)[1])
-    if seen_from is not None:
-        return seen_from_above(camera, seen_from, row)
-    if lifted.up is not None:
+    if seen_from is None and lifted.up is not None:
         return -(lifted.world_from_object[:3, :3] @ np.array(lifted.up)) / lifted.scale
-    if horizon is not None and row > horizon:
-        normal = np.array([0.0, camera.focal, camera.cy - horizon])
-        return normal / np.linalg.norm(normal)
-    return None
+    row = float(camera.project(lifted.centre)[1])
+    return ground_normal(camera, horizon, seen_from, row)
 
 
 def down_of(item: EditObject, document: Document) -> F64 | None:
@@ -106,7 +111,7 @@ def gimbal_of(item: EditObject, document: Document) -> Gimbal:
     return CAMERA_GIMBAL if down is None else Gimbal.about(down)
 
 
-SAME = 1e-12  # of cosines
+SAME = 1e-12  # by which a cosine may differ from 1
 FOOT = 0.04  # x the object's height, from its lowest point: what touches the ground
 
 
@@ -159,8 +164,7 @@ def foot_of(
 ) -> F64:
     """(3,) world: what stays where it is while an object turns or grows. `turned` has the rest."""
     motion = placement.matrix(lifted, camera)
-    stays = _foot(points, down) if lifted.stands else lifted.centre
-    return motion[:3, :3] @ stays + motion[:3, 3]
+    return motion[:3, :3] @ _still(points, lifted, down) + motion[:3, 3]
 
 
 def _on_its_foot(
@@ -174,8 +178,9 @@ def _on_its_foot(
     """`changed`, moved so that the foot of what stands is where it was `before`."""
     if not lifted.stands:
         return changed
-    stays = foot_of(before, points, lifted, camera, down)
-    offset = changed.matrix(lifted, camera)[:3, :3] @ (_foot(points, down) - lifted.centre)
+    foot, motion = _still(points, lifted, down), before.matrix(lifted, camera)
+    stays = motion[:3, :3] @ foot + motion[:3, 3]
+    offset = changed.matrix(lifted, camera)[:3, :3] @ (foot - lifted.centre)
     return with_centre(changed, stays - offset, lifted, camera)
 
 
@@ -193,8 +198,12 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
     return turned(placement, turn_of(matrix), points, lifted, camera, gimbal.down)
 
 
-def _foot(points: np.ndarray, down: np.ndarray) -> F64:
-    """(3,) the middle of the lowest of the points (N, 3)."""
+def _still(points: np.ndarray, lifted: LiftedObject, down: np.ndarray) -> F64:
+    """(3,) world at rest: the middle of the lowest of the points (N, 3) of what stands, or the
+    centre of all else.
+    """
+    if not lifted.stands:
+        return lifted.centre
     depth = points @ down
     lowest = points[depth >= depth.max() - FOOT * np.ptp(depth)]
     return np.asarray(0.5 * (lowest.min(0) + lowest.max(0)), np.float64)

@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, RGB, U8, Mask
+from ..base.arrays import F32, RGB, Mask
 from ..base.camera import Camera
 from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
@@ -25,16 +25,7 @@ from ..base.rotations import Gimbal, matrix_from_vector, vector_from_matrix
 from ..compose.composite import composite
 from ..deform.puppet import Puppet, puppet_of
 from ..document.key_edits import at_key, count_keys
-from ..document.model import (
-    Document,
-    EditObject,
-    Handle,
-    Matte,
-    Photo,
-    Placement,
-    Plate,
-    Pose,
-)
+from ..document.model import Document, EditObject, Handle, Matte, Photo, Placement, Plate, Pose
 from ..document.paint import Paint
 from ..document.placement import gimbal_of
 from ..pictures.image import to_u8
@@ -86,7 +77,7 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
             origin = replace(origin, camera=_camera(own, times, *size))
         lifted = replace(lifted, texture=texture, middle=None, origin=origin)
         if matte is not None and matte.paint is not None and (sides := lifted.sides) is not None:
-            own = matte.paint.over(_unit(sides.pixels), sides.left, sides.top)
+            own = matte.paint.over(unit_pixels(sides.pixels), sides.left, sides.top)
             sides = replace(sides, pixels=np.rint(own * 255).astype(np.uint8))
             lifted = replace(lifted, sides=sides)
     return replace(
@@ -115,7 +106,7 @@ def _matte(matte: Matte, times: int) -> Matte:
     straight = np.where(small[..., None] > 0, own / np.maximum(small, 1e-6)[..., None], beyond)
     left, top, paint = box[0] // times, box[1] // times, None
     if matte.paint is not None:  # of the photo's part; that of the sides is in their pictures
-        rgba = _unit(matte.paint.crop(box))
+        rgba = unit_pixels(matte.paint.crop(box))
         own = _means(np.dstack([rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]]), times)
         own[..., :3] /= np.maximum(own[..., 3:], 1e-6)
         levels = np.rint(255 * own).astype(np.uint8)
@@ -156,10 +147,6 @@ def _aligned(box: Box, times: int) -> Box:
         -(-x1 // times) * times,
         -(-y1 // times) * times,
     )
-
-
-def _unit(levels: U8) -> F32:
-    return np.asarray(levels / np.float32(255), np.float32)
 
 
 def _means(values: F32, times: int) -> F32:

@@ -159,8 +159,7 @@ def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
         asked.turn if "turn" in said else place.turn,
         asked.scale if "scale" in said else place.scale,
     )
-    document = edits.set_placement(document, k, _spun(document, k, place, script))
-    document = edits.set_visible(document, k, True)
+    document = edits.set_visible(_put(document, k, place, script), k, True)
     document = finished(document, k, script, said)
     if script.shadow == "none":
         document = edits.set_shadow(document, k, Shadow())
@@ -206,10 +205,7 @@ def key_poses(document: Document, k: int, puppet: Puppet, script: EditScript) ->
 
 def placed(document: Document, k: int, script: EditScript) -> Document:
     """Object `k` where the script wants it, or gone."""
-    if script.seen_from is not None:
-        document = edits.set_seen_from(document, k, script.seen_from)
-    placement = _spun(document, k, _placement(script), script)
-    document = edits.set_placement(document, k, placement)
+    document = _put(document, k, _placement(script), script)
     return edits.set_visible(document, k, False) if script.remove else document
 
 
@@ -243,12 +239,13 @@ def _placement(script: EditScript) -> Placement:
     return Placement((move[0], move[1]), move[2], turn, scale)
 
 
-def _spun(document: Document, k: int, placement: Placement, script: EditScript) -> Placement:
-    """`placement` of object `k` with the script's spin before it."""
-    item = document.objects[k]
-    if not script.spin or item.lifted is None:
-        return placement
-    return spun(placement, script.spin, item, document)
+def _put(document: Document, k: int, placement: Placement, script: EditScript) -> Document:
+    """Object `k` at a `placement`, and before that spun as the script says."""
+    if script.seen_from is not None:
+        document = edits.set_seen_from(document, k, script.seen_from)
+    if script.spin:
+        placement = spun(placement, script.spin, document.objects[k], document)
+    return edits.set_placement(document, k, placement)
 
 
 def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript) -> Document:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.base.rotations import matrix_from_vector, turn_matrix, turn_of
+from objectmorpher_core.base.rotations import matrix_from_vector, turn_matrix, turn_of, wrapped
 from objectmorpher_core.document.model import Placement
 
 from ..system.texts import t
@@ -297,11 +297,6 @@ def _turn(editor: Editor, first: Pointer) -> Change:
 def wrapped_radians(angle: float) -> float:
     """Return the same direction in (-pi, pi]."""
     return float(np.pi - (np.pi - angle) % (2 * np.pi))
-
-
-def wrapped(angle: float) -> float:
-    """Return the same direction in (-180, 180] degrees."""
-    return float(180.0 - (180.0 - angle) % 360.0)
 
 
 _CHANGES: dict[str, Callable[[Editor, Pointer], Change]] = {

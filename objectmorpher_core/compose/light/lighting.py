@@ -24,7 +24,7 @@ from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, build_levels
 from ..plate.plate import plate_cover
 from ..shadow.fall import Caster
-from ..shadow.shadow import COARSE, FINE, Shade, StandingObject, ground_normal
+from ..shadow.shadow import COARSE, FINE, USUAL_GROUND, Shade, StandingObject
 from ..silhouette import SKETCHED, sketch, sketched
 from .defocus import PhotoDefocus, StandingPlane, find_defocus
 from .grain import Grain, find_grain, sketch_grain
@@ -275,10 +275,11 @@ def _normal_under(
     lifted: LiftedObject, camera: Camera, horizon: float | None, shadow: Shadow
 ) -> F64:
     """(3,) of the ground where the object was at rest: it stays where it is."""
-    row = float(camera.project(lifted.centre)[1])
-    if shadow.ground is None and (down := down_at(lifted, camera, horizon)) is not None:
-        return down
-    return ground_normal(camera, None, shadow, row)
+    down = down_at(lifted, camera, horizon, shadow.ground)
+    if down is None:
+        down = down_at(lifted, camera, None, USUAL_GROUND)
+    assert down is not None, "one looks down on it by some degrees"
+    return down
 
 
 # Where the light on an object comes from, told from the photo without any weights.

@@ -23,7 +23,6 @@ import numpy as np
 
 from ...base.arrays import F32, F64
 from ...base.camera import Camera
-from ...document.placement import seen_from_above
 from ...document.settings import Shadow
 from ..blend import Box
 from ..silhouette import SilhouetteGrid, box_around, sampled
@@ -68,18 +67,6 @@ class Shade:
     def at(self, box: Box) -> F32:
         """Its opacity (h, w) at the pixels of a box of the photo."""
         return sampled(self.alpha, (self.left, self.top), self.pitch, box)
-
-
-def ground_normal(camera: Camera, horizon: float | None, shadow: Shadow, row: float) -> F64:
-    """(3,) world, unit, down: of the ground on which an object stands that is seen at `row` px.
-
-    `horizon`: the row of the photo it lies in, px. What the shadow says of the ground counts more.
-    """
-    if shadow.ground is None and horizon is not None and row > horizon:
-        tilt = float(np.arctan2(camera.cy - horizon, camera.focal))
-        return np.array([0.0, np.cos(tilt), np.sin(tilt)])
-    seen_from = USUAL_GROUND if shadow.ground is None else shadow.ground
-    return seen_from_above(camera, seen_from, row)
 
 
 @dataclass(frozen=True, eq=False)

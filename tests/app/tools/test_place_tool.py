@@ -12,9 +12,9 @@ from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.gizmo import TURNS, gizmo
-from objectmorpher.tools.place_tool import SLOW, PlaceTool, wrapped
+from objectmorpher.tools.place_tool import SLOW, PlaceTool
 from objectmorpher.tools.pointer import Pointer, PointerShape
-from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix
+from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix, wrapped
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import centre_of

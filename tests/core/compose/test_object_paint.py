@@ -16,7 +16,6 @@ from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Matte, Placement
 from objectmorpher_core.document.paint import SIDE
-from objectmorpher_core.document.paint_edits import set_painted
 from objectmorpher_core.lift.refitting import carried_over
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster.posed import PosedSplats
@@ -77,7 +76,7 @@ def _painted(document: Document, stroke: Stroke, is_erased: bool = False) -> Doc
         if is_erased
         else with_stroke(matte, seen, coverage, INK)
     )
-    return set_painted(document, 0, changed)
+    return document.with_object(0, replace(document.objects[0], matte=changed))
 
 
 def _grown(coverage: np.ndarray, px: int) -> np.ndarray:

@@ -14,12 +14,12 @@ from objectmorpher_core.compose.shadow.fall import Caster
 from objectmorpher_core.compose.shadow.shadow import (
     Shade,
     StandingObject,
-    ground_normal,
     opacity,
 )
 from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.placement import ground_normal
 from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
@@ -101,7 +101,7 @@ def test_it_lies_on_the_ground_that_is_seen_so(ground):
     mask = np.zeros((200, 260), bool)
     mask[30:100, 110:150] = True
     points = upright(mask, CAMERA, ground)
-    normal = ground_normal(CAMERA, None, Shadow(ground=ground), 99.0)
+    normal = ground_normal(CAMERA, None, ground, 99.0)
     sharp = Shadow(1.0, 90.0, 0.5, 0.0, 0.0)
     shade = cast(sharp, StandingObject(points, normal, CAMERA))
     assert shade is not None
@@ -118,7 +118,7 @@ def test_what_turns_throws_another_shadow():
     across = np.stack(np.meshgrid(np.linspace(-0.3, 0.3, 80), np.linspace(-0.6, 0, 120)), -1)
     flat = np.column_stack([across.reshape(-1, 2), np.zeros(across[..., 0].size)])
     away = flat[:, [2, 1, 0]]
-    normal = ground_normal(CAMERA, None, Shadow(ground=25.0), CAMERA.cy)
+    normal = ground_normal(CAMERA, None, 25.0, CAMERA.cy)
     sharp, sizes = Shadow(1.0, 0.0, 1.0, 0.0, 0.0), []
     for board in (flat, away):
         shade = cast(sharp, StandingObject(board + [0.0, 0.2, 3.0], normal, CAMERA))
@@ -130,15 +130,15 @@ def test_what_turns_throws_another_shadow():
 
 
 def test_the_horizon_tells_how_the_ground_is_seen():
-    high = ground_normal(CAMERA, -300.0, Shadow(), 150.0)
-    level = ground_normal(CAMERA, CAMERA.cy, Shadow(), 150.0)
+    high = ground_normal(CAMERA, -300.0, None, 150.0)
+    level = ground_normal(CAMERA, CAMERA.cy, None, 150.0)
     np.testing.assert_allclose(level, [0, 1, 0], atol=1e-12)
     assert high[2] > 0.5
-    told = ground_normal(CAMERA, -300.0, Shadow(ground=10.0), 150.0)
+    told = ground_normal(CAMERA, -300.0, 10.0, 150.0)
     ray = CAMERA.unproject(np.array([CAMERA.cx, 150.0]), 1.0)
     assert np.degrees(np.arcsin(told @ ray / np.linalg.norm(ray))) == pytest.approx(10, abs=1e-9)
-    below = ground_normal(CAMERA, 180.0, Shadow(), 150.0)  # a horizon under the thing tells nothing
-    np.testing.assert_allclose(below, ground_normal(CAMERA, None, Shadow(), 150.0))
+    assert ground_normal(CAMERA, 180.0, None, 150.0) is None, "it is under the thing"
+    assert ground_normal(CAMERA, None, None, 150.0) is None
 
 
 def test_a_sketch_of_a_shadow_is_near_the_exact_one():

@@ -10,7 +10,8 @@ import pytest
 from objectmorpher_core.base.arrays import F32, F64, Mask
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.shadow.fall import Caster
-from objectmorpher_core.compose.shadow.shadow import StandingObject, ground_normal
+from objectmorpher_core.compose.shadow.shadow import StandingObject
+from objectmorpher_core.document.placement import ground_normal
 from objectmorpher_core.document.settings import Shadow
 from tests.outlines import upright
 
@@ -27,7 +28,7 @@ class Board:
     def __init__(self) -> None:
         mask = np.zeros((200, 260), bool)
         mask[84:144, 100:136] = True
-        self.normal = ground_normal(CAMERA, None, Shadow(ground=SEEN_FROM), 143.0)
+        self.normal = ground_normal(CAMERA, None, SEEN_FROM, 143.0)
         self.points = upright(mask, CAMERA, SEEN_FROM, 120)
         self.standing = StandingObject(self.points, self.normal, CAMERA)
         self.axes = np.stack([[1.0, 0.0, 0.0], -self.normal, np.cross(self.normal, [1.0, 0, 0])])

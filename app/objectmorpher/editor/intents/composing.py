@@ -473,7 +473,7 @@ class Composing:
 
 def stroke_tint(
     view: ViewState, strokes: Sequence[Stroke], colour: tuple[int, int, int]
-) -> CanvasLayer:  # fmt: skip
+) -> CanvasLayer:
     """What strokes cover, as a tint of the levels `colour` over the canvas."""
     size = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
     step = GRAIN / view.zoom  # photo px per px of the tint

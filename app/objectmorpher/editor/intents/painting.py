@@ -14,7 +14,6 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.pixels import crop, unit_pixels
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
-from objectmorpher_core.document.paint_edits import without_paint
 
 from ...canvas.layer import CanvasLayer
 from ...system.texts import t
@@ -197,8 +196,10 @@ class Painting:
     def remove(self) -> None:
         """The current object without any paint; one step."""
         editor, document = self._editor, self._editor.committed
-        if document is not None and editor.object is not None and editor.object.is_painted:
-            editor.apply(t("Remove paint"), without_paint(document, editor.current))
+        item = None if document is None else document.objects[editor.current]
+        if document is not None and item is not None and item.matte is not None and item.is_painted:
+            item = replace(item, matte=replace(item.matte, paint=None))
+            editor.apply(t("Remove paint"), document.with_object(editor.current, item))
 
     def deliver(self) -> bool:
         """Takes in what was painted, between strokes; once a frame."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2
 
+from objectmorpher_core.base.rotations import wrapped
+
 from ...editor.view import PIXELS_FROM
 from ...system.texts import t
-from ...tools.place_tool import wrapped
 from ..widgets.theme import theme
 from .canvas import DARK, WHITE, CanvasPainter
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core import compose
+from objectmorpher_core.base.rotations import wrapped
 from objectmorpher_core.document.bounds import (
     MODES,
     MOST_BLUR,
@@ -30,7 +31,6 @@ from ...commands.compose import not_moved
 from ...editor.editor import Editor
 from ...editor.view import Composed, PaintWith
 from ...system.texts import sentence, t
-from ...tools.place_tool import wrapped
 from ...worker.job_functions import Variant
 from ..widgets.segmented import Segment, draw_method, segmented
 from ..widgets.theme import RADIUS, theme
