@@ -23,7 +23,6 @@ from .model import (
     Plate,
     Pose,
     Prompt,
-    is_shown_alike,
 )
 from .pose import Base
 from .rig import Rig, Seam
@@ -363,16 +362,6 @@ def set_grounded(document: Document, k: int, is_grounded: bool) -> Document:
     return document.with_object(k, replace(document.objects[k], is_grounded=is_grounded))
 
 
-def set_seen_from(document: Document, k: int, degrees: float | None) -> Document:
-    """Say from how many degrees above one looks down on object `k`; None: as it is seen to stand.
-
-    Raises EditError outside 0 to 90.
-    """
-    if degrees is not None and not 0 <= degrees <= 90:
-        raise EditError(f"one looks down on a thing by 0 to 90 degrees, not by {degrees:g}")
-    return document.with_object(k, replace(document.objects[k], seen_from=degrees))
-
-
 def set_deform(document: Document, k: int, settings: DeformSettings) -> Document:
     """Set how object `k` deforms; its pose, solved with the old settings, is dropped."""
     item = document.objects[k]
@@ -540,17 +529,6 @@ def set_strength(document: Document, strength: float) -> Document:
     if document.refined is None:
         raise EditError("the edit is not refined")
     return replace(document, refined=replace(document.refined, strength=float(strength)))
-
-
-def show_the_same(one: Document, other: Document) -> bool:
-    """Whether a refinement of one edit is one of the other, too."""
-    if one.photo is not other.photo or one.plate is not other.plate:
-        return False
-    if (one.horizon, one.feather) != (other.horizon, other.feather):
-        return False
-    if one.depth is not other.depth or len(one.objects) != len(other.objects):
-        return False
-    return all(map(is_shown_alike, one.objects, other.objects))
 
 
 # Changes of how an object's regions move, as pure functions Document -> Document.

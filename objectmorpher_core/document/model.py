@@ -18,6 +18,7 @@ from ..base.arrays import F32, F64, I32, U8, Mask, Pixels, Selection, frozen
 from ..base.camera import Camera
 from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
+from .alike import is_shown_alike
 from .bounds import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 from .gaussians import Gaussians
 from .paint import Paint
@@ -556,23 +557,6 @@ class Plate:
         """x0, y0, x1, y1 px of the crop in the photo."""
         height, width = self.hole.shape
         return self.left, self.top, self.left + width, self.top + height
-
-
-# Of an object, what its picture depends on; what else changes leaves a refinement as it is.
-SHOWN = (
-    "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
-    "harmony", "relight", "grain", "defocus", "stays_in_front", "finish", "seen_from",
-)  # fmt: skip
-
-
-def is_shown_alike(one: EditObject, other: EditObject) -> bool:
-    """Whether two objects look the same; arrays do only where they are one and the same."""
-
-    def is_same(a: object, b: object) -> bool:
-        is_plain = not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray)
-        return a is b or (is_plain and a == b)
-
-    return all(is_same(getattr(one, name), getattr(other, name)) for name in SHOWN)
 
 
 @dataclass(frozen=True, eq=False)

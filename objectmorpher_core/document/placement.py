@@ -101,6 +101,16 @@ def down_of(item: EditObject, document: Document) -> F64 | None:
     return None
 
 
+def set_seen_from(document: Document, k: int, degrees: float | None) -> Document:
+    """Say from how many degrees above one looks down on object `k`; None: as it is seen to stand.
+
+    Raises ValueError outside 0 to 90.
+    """
+    if degrees is not None and not 0 <= degrees <= 90:
+        raise ValueError(f"one looks down on a thing by 0 to 90 degrees, not by {degrees:g}")
+    return document.with_object(k, replace(document.objects[k], seen_from=degrees))
+
+
 def gimbal_of(item: EditObject, document: Document) -> Gimbal:
     """The axes about which an object is turned: about what is upright there, else the camera's."""
     if item.lifted is None:

@@ -34,7 +34,7 @@ from ..document.model import (
     Placement,
     Prompt,
 )
-from ..document.placement import spun
+from ..document.placement import set_seen_from, spun
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
@@ -242,7 +242,7 @@ def _placement(script: EditScript) -> Placement:
 def _put(document: Document, k: int, placement: Placement, script: EditScript) -> Document:
     """Object `k` at a `placement`, and before that spun as the script says."""
     if script.seen_from is not None:
-        document = edits.set_seen_from(document, k, script.seen_from)
+        document = set_seen_from(document, k, script.seen_from)
     if script.spin:
         placement = spun(placement, script.spin, document.objects[k], document)
     return edits.set_placement(document, k, placement)

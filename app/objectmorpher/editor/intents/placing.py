@@ -19,6 +19,7 @@ from objectmorpher_core.document.placement import (
     foot_of,
     gimbal_of,
     scaled,
+    set_seen_from,
     turned,
     with_centre,
 )
@@ -71,7 +72,7 @@ class Placing:
         """The same, as it is seen to stand, whatever the artist says."""
         document, k = self._editor.document, self._editor.current
         assert document is not None and document.objects[k].lifted is not None
-        document = edits.set_seen_from(document, k, None)
+        document = set_seen_from(document, k, None)
         thing = document.objects[k]
         assert thing.lifted is not None
         way = thing.lifted.centre / np.linalg.norm(thing.lifted.centre)
@@ -82,7 +83,7 @@ class Placing:
         """Previews the current object as seen from so many degrees above; None: as it stands."""
         editor = self._editor
         if editor.committed is not None and editor.is_lifted:
-            editor.preview = edits.set_seen_from(editor.committed, editor.current, degrees)
+            editor.preview = set_seen_from(editor.committed, editor.current, degrees)
 
     @property
     def angles(self) -> tuple[float, float, float]:

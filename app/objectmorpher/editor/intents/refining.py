@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.alike import show_the_same
 from objectmorpher_core.document.model import Document
 from objectmorpher_core.document.settings import Refined
 
@@ -81,7 +82,7 @@ class RefiningIntents:
         if self._answer is None or editor.hand.is_busy or editor.preview is not None:
             return False
         (asked, refined), self._answer = self._answer, None
-        if document is None or not edits.show_the_same(asked, document):
+        if document is None or not show_the_same(asked, document):
             editor.say(t("The edit has changed meanwhile: refine it again"))
         else:
             editor.apply(t("Refine"), edits.set_refined(document, refined))
