@@ -75,7 +75,7 @@ class Composing:
         self._editor = editor
         self._methods, self._tasks, self._choose_tool = methods, tasks, choose_tool
         self._variants: tuple[tuple[Mask | None, ...], tuple[Variant, ...]] = ((), ())
-        self._ready: list[Callable[[], None]] = []  # answers that wait for the hand to be idle
+        self._answers = Answers(editor)
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
@@ -84,19 +84,15 @@ class Composing:
 
     def forget(self) -> None:
         """Another document is opened."""
-        self._variants, self._ready = ((), ()), []
+        self._variants = (), ()
+        self._answers.forget()
         self._stroke, self._waiting, self._offer, self._compared = None, [], None, None
 
     def deliver(self) -> bool:
         """Takes in what the worker has made, between strokes; once a frame."""
         if self._compared is not None and self._editor.view.tool is not ToolName.COMPOSE:
             self.compare_variant(None)
-        if not self._ready or self._editor.hand.is_busy:
-            return False
-        ready, self._ready = self._ready, []
-        for take in ready:
-            take()
-        return True
+        return self._answers.deliver()
 
     # The background
 
@@ -154,7 +150,7 @@ class Composing:
             self._take_plate(masks, plate, label, hints)
 
         def accept(plate: Plate) -> None:
-            self._ready.append(lambda: take(plate))
+            self._answers.add(lambda: take(plate))
 
         def fail(error: JobError) -> None:
             end()
@@ -280,7 +276,7 @@ class Composing:
         patch = patch_of(document, stroke.coverage, stroke.box)
 
         def accept(answer: tuple[PlatePatch, str]) -> None:
-            self._ready.append(lambda: self._take_repair(asked, *answer))
+            self._answers.add(lambda: self._take_repair(asked, *answer))
 
         def fail(error: JobError) -> None:
             self._waiting = []
@@ -397,7 +393,7 @@ class Composing:
             shadow, plate = answer
             if is_known:
                 shadow = replace(shadow, ground=told)
-            self._ready.append(
+            self._answers.add(
                 lambda: self._show_offer(masks, ShadowOffer(document, k, shadow, plate))
             )
 
@@ -469,6 +465,29 @@ class Composing:
             editor.preview = change(editor.committed, editor.current)
         except ValueError as error:
             editor.complain(str(error))
+
+
+class Answers:
+    """What a worker has made: it is taken in as soon as the hand is idle."""
+
+    def __init__(self, editor: EditorState) -> None:
+        self._editor = editor
+        self._waiting: list[Callable[[], None]] = []
+
+    def add(self, take: Callable[[], None]) -> None:
+        self._waiting.append(take)
+
+    def forget(self) -> None:
+        self._waiting = []
+
+    def deliver(self) -> bool:
+        """Takes in what waits; whether there was anything."""
+        if not self._waiting or self._editor.hand.is_busy:
+            return False
+        waiting, self._waiting = self._waiting, []
+        for take in waiting:
+            take()
+        return True
 
 
 def stroke_tint(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,7 @@ from ...canvas.layer import CanvasLayer
 from ...system.texts import t
 from ...worker.requests import JobError
 from ..view import PaintWith
-from .composing import stroke_tint
+from .composing import Answers, stroke_tint
 
 if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
@@ -126,11 +125,12 @@ class Painting:
         self._stroke: _Laid | None = None  # being painted
         self._waiting: list[tuple[int, _Laid]] = []  # on which object; the first is worked on
         self._aside: tuple[float, float] | None = None  # image px from the brush to its source
-        self._ready: list[Callable[[], None]] = []  # answers that wait for the hand to be idle
+        self._answers = Answers(editor)
 
     def forget(self) -> None:
         """Another document is opened."""
-        self._stroke, self._waiting, self._aside, self._ready = None, [], None, []
+        self._stroke, self._waiting, self._aside = None, [], None
+        self._answers.forget()
         self._editor.view.compose.source = None
 
     def toggle(self) -> None:
@@ -203,12 +203,7 @@ class Painting:
 
     def deliver(self) -> bool:
         """Takes in what was painted, between strokes; once a frame."""
-        if not self._ready or self._editor.hand.is_busy:
-            return False
-        ready, self._ready = self._ready, []
-        for take in ready:
-            take()
-        return True
+        return self._answers.deliver()
 
     @property
     def source(self) -> tuple[float, float] | None:
@@ -247,7 +242,7 @@ class Painting:
             return canvas.painted(laid)
 
         def accept(answer: _Painted) -> None:
-            self._ready.append(lambda: self._take(k, laid, canvas.item, answer))
+            self._answers.add(lambda: self._take(k, laid, canvas.item, answer))
 
         def drop() -> None:
             self._waiting = []
