@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from objectmorpher_core.base.rotations import turn_about, turn_matrix, vector_from_matrix
+from objectmorpher_core.document.placement import gimbal_of
 from objectmorpher_core.pipeline import Edited, replay, run_script
 from objectmorpher_core.scripting.options import ScriptError
 from objectmorpher_core.scripting.script import BatchItem, parse_scripts
@@ -51,6 +53,17 @@ def _exact(edited: Edited) -> None:
     assert away.any() and edited.composite.changed > 0
     assert np.array_equal(edited.picture.pixels[away], PIXELS[away])
     assert edited.composite.outside_footprint_changed == 0
+
+
+def test_a_copy_is_spun_as_what_it_is_a_copy_of_stands():
+    copies = [{"duplicate": 1, "spin": 30, "move": [60, 20]}]
+    edited = _run(_item(**{"seen-from": 50}, objects=copies))
+    _, copy = edited.document.objects
+    assert copy.seen_from == 50.0
+    down = gimbal_of(copy, edited.document).down
+    matrix = turn_matrix(*copy.placement.turn)
+    np.testing.assert_allclose(matrix @ down, down, atol=1e-9)
+    assert np.degrees(turn_about(vector_from_matrix(matrix), down)) == pytest.approx(30)
 
 
 @pytest.mark.slow
