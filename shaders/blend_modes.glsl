@@ -1,4 +1,4 @@
-// compose/blend_modes.py, `mixed`: a premultiplied colour over an opaque one.
+// compose/composite.py, `mixed`: a premultiplied colour over an opaque one.
 
 const int MULTIPLY = 1, SCREEN = 2;
 
