@@ -1,4 +1,4 @@
-"""Changes of what holds an object, as pure functions Document -> Document.
+"""Changes of what holds an object, and locks it, as pure functions Document -> Document.
 
 A handle that is added, softened, pinned or removed changes what the object wants, and so its pose,
 if nothing else is said. Here it is said that the pose stays as it is: it becomes the base from
@@ -7,7 +7,7 @@ which the handles move the object from now on (`pose.Base`).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -102,3 +102,28 @@ def _beyond(deformer: Deformer, nodes: list[int], reach: float) -> I32:
         return np.empty(0, np.int32)
     distances = np.min([deformer.graph.distances_from(node) for node in nodes], axis=0)
     return np.flatnonzero(distances > reach * deformer.diameter).astype(np.int32)
+
+
+# A locked object is kept from changes by a slip.
+
+OF_A_ROW = ("name", "is_visible", "is_locked", "layer")  # what also a locked object may change in
+KEPT = tuple(f.name for f in fields(EditObject) if f.name not in OF_A_ROW)
+
+
+def set_locked(document: Document, k: int, is_locked: bool) -> Document:
+    """Object `k` kept from changes by a slip, or free to be changed."""
+    return document.with_object(k, replace(document.objects[k], is_locked=is_locked))
+
+
+def locked_change(before: Document, after: Document) -> EditObject | None:
+    """The locked object of `before` that is changed or gone in `after`, if there is one.
+
+    Its name, whether it is shown, and which others it covers are not kept from change.
+    """
+    locked = (own for own in before.objects if own.is_locked)
+    return next((own for own in locked if not any(_is_same(own, o) for o in after.objects)), None)
+
+
+def _is_same(one: EditObject, other: EditObject) -> bool:
+    """Whether they differ at most in what also a locked object may change in."""
+    return one is other or all(getattr(one, name) is getattr(other, name) for name in KEPT)

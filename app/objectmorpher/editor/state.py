@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.document import lock_edits, visitor_edits
+from objectmorpher_core.document import hold_edits, visitor_edits
 from objectmorpher_core.document.model import Document, EditObject
 
 from ..canvas.derived import Derived
@@ -172,7 +172,7 @@ class EditorState:
         if visitor is not None:
             self.say_visitor(visitor)
             return True
-        own = None if before is None else lock_edits.locked_change(before, changed)
+        own = None if before is None else hold_edits.locked_change(before, changed)
         if before is not None and own is not None:
             self.say_locked(next(k for k, each in enumerate(before.objects) if each is own))
         return own is not None
@@ -199,7 +199,7 @@ class EditorState:
         if document is not None and k < len(document.objects) and not self.hand.is_busy:
             is_locked = not document.objects[k].is_locked
             label = t("Lock object") if is_locked else t("Unlock object")
-            self.apply(label, lock_edits.set_locked(document, k, is_locked))
+            self.apply(label, hold_edits.set_locked(document, k, is_locked))
             if is_locked:
                 self.say_locked(k)
             else:

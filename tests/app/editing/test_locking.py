@@ -12,7 +12,7 @@ from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.gui.window.input import _is_locked
 from objectmorpher.tools.pointer import Pointer
-from objectmorpher_core.document import edits, lock_edits
+from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.settings import Finish
 from objectmorpher_core.session.file import decode_session, encode_session
@@ -69,4 +69,4 @@ def test_its_button_unlocks_it_and_undo_covers_both(locked: Editor) -> None:
     assert editor.committed is before
     run(editor, "undo")
     assert not editor.object.is_locked
-    assert lock_edits.locked_change(before, edits.remove_object(before, 0)) is before.objects[0]
+    assert hold_edits.locked_change(before, edits.remove_object(before, 0)) is before.objects[0]
