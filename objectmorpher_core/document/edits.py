@@ -106,7 +106,7 @@ def answer_prompt(document: Document, k: int, found: Mask, prompt: Prompt) -> Do
     What was changed by hand since the last answer stays as it is, except where a new click says
     the contrary: the latest word counts.
     """
-    from ..segment.corrections import corrected
+    from ..segment.mask_edit import corrected
 
     item = document.objects[k]
     if item.found is None or item.mask is None:
