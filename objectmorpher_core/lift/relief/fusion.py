@@ -12,11 +12,10 @@ from ...base.arrays import F32, F64, Mask
 from ...base.camera import Camera
 from ...base.poisson_disk import nearest_in
 from ..crop import SIDE, rays
-from .body import ReliefBody
+from .body import ReliefBody, lacking
 from .canvas import bilinear
 from .cuts import find_cuts
 from .integration import integrated
-from .lean import lacking
 from .shape_look import SeenShape
 from .silhouette import ReliefSilhouette
 from .standing import StandingSheet

@@ -25,14 +25,13 @@ from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
 from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of, rounded
 from . import shape_look
-from .body import MIDDLE, ReliefBody
+from .body import MIDDLE, ReliefBody, leaning
 from .canvas import ReliefCanvas, bilinear
 from .closing import closed
 from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
-from .lean import leaning
 from .mirror import MirrorAxis, find_axis
 from .sides import with_sides
 from .silhouette import ReliefSilhouette

@@ -12,9 +12,8 @@ from objectmorpher_core.base.progress import silent
 from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
-from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
+from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody, lacking, leaning
 from objectmorpher_core.lift.relief.fusion import fused
-from objectmorpher_core.lift.relief.lean import lacking, leaning
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.shape_look import SeenShape
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
