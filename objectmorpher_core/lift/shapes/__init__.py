@@ -8,8 +8,7 @@ most gives the object's front and back as far as it explains them; the rest stay
 
 from __future__ import annotations
 
-from .completing import completed, flattened, rounded
-from .recognition import Recognised, recognised
+from .recognition import Recognised, completed, flattened, recognised, rounded
 from .rims import rims_of
 from .tableware import laid
 
