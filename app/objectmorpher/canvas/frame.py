@@ -16,14 +16,13 @@ from objectmorpher_core.document.model import Document, Plate
 
 from ..editor.view import Shown, ViewState
 from .blend import CELL, build_blend
-from .derived import Derived
+from .derived import Derived, SurfaceFacts
 from .fronts import Fronts, RefinedView
 from .layer import CanvasLayer, FrameObject, ObjectPart, PosedObject, is_front
 from .layers import FRAME, Layers
 from .lights import Lights
 from .memo import Memo
 from .painter import Painter
-from .surface_facts import SurfaceFacts
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
