@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from imgui_bundle import ImVec2
+from imgui_bundle import ImVec2, imgui
 
 from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
-from ...editor.view import ToolName
+from ...editor.view import Popup, PoseMode, Shown, ToolName
+from ...system.texts import t
 from ..overlay.canvas import CanvasPainter
-from ..overlay.card import draw_card
 from ..overlay.compose import draw_compose
 from ..overlay.legend import Legend
 from ..overlay.look import draw_comparison, draw_look, draw_pixel_grid
 from ..overlay.place import draw_frame
 from ..overlay.pose import draw_control_points, draw_pose
 from ..overlay.select import draw_left_out, draw_mask, draw_selection
-from .landmarks import mark_on_canvas
+from ..widgets.theme import theme
+from ..widgets.widgets import Emphasis, bold_text, button
+from .landmarks import mark, mark_on_canvas
 from .layout import Rect
 
 DRAWN: dict[ToolName, Callable[[CanvasPainter], None]] = {
@@ -51,3 +54,53 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
         draw_comparison(canvas)
     canvas.draw.pop_clip_rect()
     draw_card(editor, rect)
+
+
+# A card over the photo that says how posing begins; it stays until the artist dismisses it.
+
+POSING = "posing"  # its name among the settings' dismissed cards
+ABOVE = 16.0  # points between it and the canvas's lower edge
+LEAST_CANVAS = 420.0  # points of the canvas each way, with less it would cover the photo
+
+
+def draw_card(editor: Editor, rect: Rect) -> None:
+    """For the Pose tool; `rect`: the canvas."""
+    view = editor.view
+    is_posing = view.tool is ToolName.POSE and view.pose.mode is PoseMode.DRAG
+    is_free = editor.is_lifted and editor.object is not None and not editor.object.is_locked
+    is_meant = is_posing and is_free and view.shown is Shown.COMPOSITE
+    if not is_meant or POSING in editor.settings.dismissed or editor.hand.is_busy:
+        return
+    if min(rect.width, rect.height) < theme.pt(LEAST_CANVAS) or view.is_before:
+        return
+    foot = ImVec2(rect.x + rect.width / 2, rect.y + rect.height - theme.pt(ABOVE))
+    imgui.set_next_window_pos(foot, imgui.Cond_.always, ImVec2(0.5, 1.0))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(16, 12))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(8))
+    imgui.push_style_color(imgui.Col_.window_bg, theme.vec("panel"))
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
+    flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_focus_on_appearing
+    imgui.begin("##card", None, flags | imgui.WindowFlags_.no_bring_to_front_on_focus)
+    imgui.pop_style_color()
+    imgui.pop_style_var(2)
+    with bold_text():
+        imgui.text_unformatted(t("Drag any point of it: the rest follows"))
+    _draw_line(t("P over a point, or Alt-click"), t("pins it, so that it stays"))
+    _draw_line(t("Wheel while dragging"), t("brings it nearer, or takes it farther"))
+    _draw_line(t("Ctrl-drag"), t("turns the point"))
+    imgui.dummy(theme.size(0, 2))
+    if button(t("Got it"), Emphasis.PRIMARY_SMALL, width=88):
+        dismissed = (*editor.settings.dismissed, POSING)
+        editor.settings = replace(editor.settings, dismissed=dismissed)
+    mark(t("Got it"))
+    imgui.same_line(0, theme.pt(8))
+    if button(t("Read more"), Emphasis.QUIET, width=104):
+        view.help_page, view.popup = "bend", Popup.HELP
+    imgui.end()
+
+
+def _draw_line(gesture: str, meaning: str) -> None:
+    imgui.text_unformatted(gesture)
+    imgui.same_line(0, theme.pt(6))
+    imgui.text_colored(theme.vec("secondary"), meaning)
