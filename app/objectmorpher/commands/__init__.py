@@ -6,7 +6,7 @@ from ..editor.editor import Editor
 from ..editor.tasks import SELECT
 from ..editor.view import ToolName
 from ..system.texts import t
-from . import compose, edit, look, objects, pose, select
+from . import compose, edit, objects
 from .command import Command
 
 # Which settings there are, by the command that brings them into view: for the command palette.
@@ -41,11 +41,11 @@ __all__ = [
 GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
     "File": edit.FILE_COMMANDS,
     "Edit": edit.COMMANDS,
-    "Select": select.COMMANDS,
+    "Select": objects.SELECT_COMMANDS,
     "Objects": objects.COMMANDS,
-    "Pose": pose.COMMANDS,
+    "Pose": objects.POSE_COMMANDS,
     "Place": objects.PLACE_COMMANDS,
-    "Look": look.COMMANDS,
+    "Look": edit.LOOK_COMMANDS,
     "Compose": compose.COMMANDS,
     "Window": edit.WINDOW_COMMANDS,
 }

@@ -1,4 +1,4 @@
-"""The photo's objects: copies, names, which covers which, and where each one is."""
+"""The photo's objects: how they are found and lifted, listed, placed and posed."""
 
 from __future__ import annotations
 
@@ -7,9 +7,20 @@ from collections.abc import Callable
 from objectmorpher_core.document.model import Placement
 
 from ..editor.editor import Editor
+from ..editor.filing import Dialog
 from ..editor.tasks import SELECT
+from ..editor.view import Painted, ToolName
 from ..system.texts import t
-from .command import Command, Reason, no_lift, no_photo
+from .command import (
+    Command,
+    Reason,
+    asks_for,
+    cannot_lift,
+    no_handle,
+    no_lift,
+    no_photo,
+    no_selection,
+)
 
 FAR = 1000  # places: past all others
 
@@ -114,4 +125,172 @@ PLACE_COMMANDS: dict[str, Command] = {
         "Move over the ground", "G", lambda e: e.placing.toggle_ground(), no_lift,
         lambda e: e.placing.is_grounded,
     ),
+}  # fmt: skip
+
+
+# The selection, its edge, its file, and lifting what is selected.
+
+
+def _no_soft_edge(editor: Editor) -> str | None:
+    is_soft = editor.masking.is_soft
+    return no_selection(editor) or (
+        None if is_soft else t("The edge is found in the photo already")
+    )
+
+
+def _nothing_left_out(editor: Editor) -> str | None:
+    is_any = bool(editor.leaving_out.pieces)
+    return no_lift(editor) or (None if is_any else t("Nothing beside it looks like a part of it"))
+
+
+def _not_a_file(editor: Editor) -> str | None:
+    is_file = editor.shaping.why_fixed is not None
+    return no_lift(editor) or (None if is_file else t("It was lifted from this photo"))
+
+
+def _nothing_painted(editor: Editor) -> str | None:
+    shape, painted = editor.shaping.settings, editor.view.selecting.painted
+    field = shape.hidden if painted is Painted.HIDDEN else shape.nearness
+    return no_selection(editor) or (None if field is not None else t("Nothing is painted yet"))
+
+
+def _is_edge_brush(editor: Editor) -> bool:
+    return editor.view.tool is ToolName.MASK and editor.view.selecting.painted is Painted.EDGE
+
+
+def _toggle_edge_brush(editor: Editor) -> None:
+    """To the edge brush, or from it back to the brush of the selection."""
+    is_on = _is_edge_brush(editor)
+    editor.choose_tool(ToolName.MASK)
+    editor.view.selecting.painted = Painted.SELECTION if is_on else Painted.EDGE
+
+
+SELECT_COMMANDS: dict[str, Command] = {
+    "subject": Command("Select subject", "Ctrl+Shift+A", lambda e: e.selection.select_subject()),
+    "invert": Command(
+        "Invert selection", "Ctrl+Shift+I", lambda e: e.masking.invert(), no_selection
+    ),
+    "clear": Command("Clear selection", "Ctrl+D", lambda e: e.selection.clear(), no_selection),
+    "grow": Command("Grow", "", lambda e: e.masking.grow(), no_selection),
+    "shrink": Command("Shrink", "", lambda e: e.masking.shrink(), no_selection),
+    "smooth": Command("Smooth", "", lambda e: e.masking.smooth(), no_selection),
+    "feather": Command("Feather", "", lambda e: e.masking.feather(), no_selection),
+    "fill_holes": Command("Fill holes", "", lambda e: e.masking.fill_holes(), no_selection),
+    "remove_islands": Command(
+        "Remove islands", "", lambda e: e.masking.remove_islands(), no_selection
+    ),
+    "add_left_out": Command(
+        "Add what was left out", "", lambda e: e.leaving_out.add(), _nothing_left_out
+    ),
+    "harden": Command("Edge from the photo", "", lambda e: e.masking.harden(), _no_soft_edge),
+    "edge_brush": Command("Edge brush", "E", _toggle_edge_brush, no_selection, _is_edge_brush),
+    "decontaminate": Command(
+        "Decontaminate edge",
+        "",
+        lambda e: e.edging.toggle_decontaminate(),
+        no_lift,
+        lambda e: e.edging.decontaminate > 0,
+    ),
+    "import_mask": Command("Import mask…", "", asks_for(Dialog.MASK_OPEN)),
+    "export_mask": Command("Export mask…", "", asks_for(Dialog.MASK_SAVE), no_selection),
+    "lift": Command("Lift object", "Ctrl+L", lambda e: e.tasks.lift(), cannot_lift),
+    "import_shape": Command("Use a 3D file…", "", asks_for(Dialog.SHAPE_OPEN), no_selection),
+    "fit_again": Command("Fit to the photo", "", lambda e: e.shaping.fit_again(), _not_a_file),
+    "clear_painted": Command(
+        "Clear what is painted", "", lambda e: e.shaping.clear_painted(), _nothing_painted
+    ),
+}
+
+
+# Handles and what holds the object.
+
+
+def no_handles(editor: Editor) -> str | None:
+    """Return the reason why a command for all handles cannot run: there are none."""
+    is_there = editor.object is not None and editor.object.handles
+    return no_lift(editor) or (None if is_there else t("There is no handle yet"))
+
+
+def _no_pose(editor: Editor) -> str | None:
+    is_posed = editor.object is not None and editor.object.pose is not None
+    return None if is_posed else no_handles(editor)
+
+
+def _toggle_ring(editor: Editor) -> None:
+    editor.view.pose.has_ring = not editor.view.pose.has_ring
+
+
+def _toggle_influence(editor: Editor) -> None:
+    editor.view.pose.has_influence = not editor.view.pose.has_influence
+
+
+def _remove(editor: Editor) -> None:
+    """What is chosen in this tool: in Place it is the object."""
+    if editor.view.tool is ToolName.PLACE:
+        editor.objects.remove()
+    else:
+        editor.posing.remove()
+
+
+def _nothing_to_remove(editor: Editor) -> str | None:
+    return no_lift(editor) if editor.view.tool is ToolName.PLACE else no_handle(editor)
+
+
+def _no_place_for_a_pin(editor: Editor) -> str | None:
+    is_there = editor.hover.surface is not None or editor.hover.handle is not None
+    return no_lift(editor) or (None if is_there else t("Point at the object to pin it there"))
+
+
+def _no_key(editor: Editor) -> str | None:
+    is_there = editor.keying.count > 0
+    return no_lift(editor) or (None if is_there else t("There is no key pose yet"))
+
+
+def _nothing_to_replace(editor: Editor) -> str | None:
+    is_same = editor.keying.shown is not None
+    return _no_key(editor) or (t("Nothing has changed since") if is_same else None)
+
+
+def _send_back(editor: Editor) -> None:
+    editor.posing.send_back(editor.posing.selected, t("Reset handle"))
+
+
+def _send_all_back(editor: Editor) -> None:
+    thing = editor.object
+    count = len(thing.handles) if thing else 0
+    editor.posing.send_back(tuple(range(count)), t("Reset all handles"))
+
+
+POSE_COMMANDS: dict[str, Command] = {
+    "remove_handle": Command(
+        "Remove handle", "Delete", _remove, _nothing_to_remove,
+        other_keys=("Backspace",),
+    ),
+    "pin": Command("Pin under the pointer", "P", lambda e: e.posing.pin(), _no_place_for_a_pin),
+    "select_handles": Command(
+        "Select all handles", "Ctrl+A", lambda e: e.posing.select_all(), no_handles
+    ),
+    "reset_handle": Command("Reset handle", "", _send_back, no_handle),
+    "reset_handles": Command("Reset all handles", "", _send_all_back, no_handles),
+    "reset_pose": Command("Reset pose", "", lambda e: e.posing.reset(), _no_pose),
+    "ring": Command(
+        "Rotation ring", "R", _toggle_ring, no_lift, lambda e: e.view.pose.has_ring
+    ),
+    "mirror": Command(
+        "Symmetry", "", lambda e: e.posing.mirroring.toggle(), no_lift,
+        lambda e: e.posing.mirroring.is_on,
+    ),
+    "influence": Command(
+        "Influence of the handle", "", _toggle_influence, no_lift,
+        lambda e: e.view.pose.has_influence,
+    ),
+    "add_key": Command(
+        "Add key pose", "", lambda e: e.keying.add(), lambda e: e.keying.why_not_add
+    ),
+    "next_key": Command("Next key pose", "", lambda e: e.keying.step(1), _no_key),
+    "previous_key": Command("Previous key pose", "", lambda e: e.keying.step(-1), _no_key),
+    "replace_key": Command(
+        "Replace key pose", "", lambda e: e.keying.replace(), _nothing_to_replace
+    ),
+    "remove_key": Command("Remove key pose", "", lambda e: e.keying.remove(), _no_key),
 }  # fmt: skip
