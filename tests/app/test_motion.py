@@ -11,7 +11,7 @@ import pytest
 
 from hands import PATIENCE, ROOT
 from objectmorpher.editor.settings import AUTO, read_settings
-from objectmorpher.system.motion import FULL, REDUCED, MotionPreference
+from objectmorpher.system.desktop import FULL, REDUCED, MotionPreference
 from tests.tree import PYTHONPATH
 
 

@@ -13,7 +13,7 @@ from PIL import ImageCms
 
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import AS_THEY_ARE, AUTO, Settings
-from objectmorpher.system.screen_profile import read_profile, system_profile
+from objectmorpher.system.desktop import read_profile, system_profile
 from objectmorpher_core.document.model import Document
 
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()

@@ -60,7 +60,7 @@ class LookingIntents:
 
     def screen_profile(self) -> bytes | None:
         """Return the ICC profile of the screen; None: it is taken for sRGB."""
-        from ...system.screen_profile import read_profile, system_profile
+        from ...system.desktop import read_profile, system_profile
 
         chosen = self._editor.settings.screen_profile
 
@@ -83,7 +83,7 @@ class LookingIntents:
         """From now on the screen has the profile of a file."""
         from objectmorpher_core.pictures.screen_colours import profile_name
 
-        from ...system.screen_profile import read_profile
+        from ...system.desktop import read_profile
 
         editor, profile = self._editor, read_profile(path)
         name = None if profile is None else profile_name(profile)

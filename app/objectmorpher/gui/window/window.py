@@ -25,8 +25,8 @@ from ...editor.editor import Editor
 from ...editor.settings import read_settings, settings_path, write_settings
 from ...editor.shortcuts import Shortcuts
 from ...render.renderer import Renderer
+from ...system.desktop import motion
 from ...system.freed_memory import set_aside
-from ...system.motion import motion
 from ...system.texts import ENGLISH, t, use_language
 from ...tools.pointer import PointerShape
 from ..dialogs.dialogs import Dialogs

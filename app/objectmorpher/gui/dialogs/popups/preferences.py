@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from ....editor.editor import Editor
 from ....editor.filing import Dialog
 from ....editor.settings import AS_THEY_ARE, AUTO, HERE, SERVER
-from ....system.motion import FULL, REDUCED
+from ....system.desktop import FULL, REDUCED
 from ....system.texts import languages, t
 from ...widgets.modal import label, popup
 from ...widgets.segmented import Segment, draw_method, segmented
