@@ -434,7 +434,7 @@ SUBCOMMANDS = (
     _command("info", "show what a session holds", _add_info),
     _command("convert", "convert splat and mesh files", _add_convert),
     Subcommand("share", "make a web page in which the object can be dragged", _add_share,
-               lazily("share", "run_share")),
+               lazily("commands", "run_share")),
     Subcommand(
         "models", "list, get and check learned weights", _add_models,
         lazily("models", "run_models"),
