@@ -55,8 +55,7 @@ from ..widgets.widgets import (
     tooltip,
 )
 from ..window.landmarks import mark
-from .brush import draw_brush_fields, draw_radius
-from .select import draw_decontaminate
+from .select import draw_brush_fields, draw_decontaminate, draw_radius
 
 MIXED = dict(zip(MODES, ("Normal", "Multiply", "Screen", "Soft light"), strict=True))
 REFINERS = {"none": "None", "harmonise": "Harmonise"}

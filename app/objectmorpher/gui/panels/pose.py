@@ -36,7 +36,7 @@ from ..widgets.widgets import (
     tooltip,
 )
 from .animation import draw_timeline
-from .brush import draw_radius
+from .select import draw_radius
 
 STAYS = {Stays.FAR: "Far side", Stays.ELSE: "All else", Stays.NOTHING: "Only pins"}
 WHAT_STAYS = {

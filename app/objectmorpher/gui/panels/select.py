@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from imgui_bundle import imgui
 
 from objectmorpher_core.document.model import EditObject
@@ -11,6 +13,7 @@ from ...commands import COMMANDS, run, why_not
 from ...editor.editor import Editor
 from ...editor.view import Painted, SelectMode
 from ...system.texts import t
+from ...tools.navigate import LARGEST_BRUSH, SMALLEST_BRUSH
 from ..dialogs.models_dialog import draw_offer
 from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import Icon
@@ -25,7 +28,6 @@ from ..widgets.widgets import (
     number_field,
     tooltip,
 )
-from .brush import draw_brush_fields, draw_radius
 
 # The parts shared by the Select and the Mask tool: the selection's edge, and its file.
 
@@ -262,3 +264,26 @@ def _draw_front(editor: Editor, item: EditObject) -> None:
     if checkbox(t("Keep in front"), item.stays_in_front) != item.stays_in_front:
         run(editor, "keep_in_front")
     tooltip(t("It is not edited, and covers what moves behind it"))
+
+
+# The brush's numbers, for every tool that paints.
+
+STEP = 0.2  # x the radius, of the - and + buttons
+
+
+def draw_radius(editor: Editor) -> None:
+    radius = editor.view.brush.radius
+    step = max(STEP * radius, 0.5)  # a fifth of a large one is seen, and of a small one is left
+    number = Number(t("Radius"), "%.1f px", 0.25, step, 20.0, SMALLEST_BRUSH, LARGEST_BRUSH)
+    change = number_field(number, radius)
+    if change.is_changed:
+        editor.view.brush = replace(editor.view.brush, radius=change.value)
+
+
+def draw_brush_fields(editor: Editor) -> None:
+    """Draw the fields of the brush's size and hardness."""
+    draw_radius(editor)
+    number = Number(t("Hardness"), "%.0f %%", 0.5, 10.0, 80.0, 0.0, 100.0)
+    change = number_field(number, 100 * editor.view.brush.hardness)
+    if change.is_changed:
+        editor.view.brush = replace(editor.view.brush, hardness=change.value / 100)
