@@ -17,8 +17,7 @@ import numpy as np
 from objectmorpher.cli.options import WindowOptions
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.feedback import StatusMessage
-from objectmorpher.editor.view import Popup, ToolName
+from objectmorpher.editor.view import Popup, StatusMessage, ToolName
 from objectmorpher.gui.window.glfw_window import open_window
 from objectmorpher.gui.window.window import Window
 from shoot_views import made_document

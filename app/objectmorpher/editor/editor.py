@@ -19,7 +19,6 @@ from ..system.freed_memory import give_back
 from ..system.texts import t
 from ..worker.jobs import RELUCTANCE
 from .candidate import Candidates, CloserLook
-from .feedback import Hover
 from .filing import OPEN, Dialog, Filing
 from .history import History
 from .intents.composing import Composing
@@ -50,7 +49,7 @@ from .settings import Settings
 from .state import EditorState
 from .tabs import Tabs
 from .tasks import READY, SELECT, WRITE, Tasks
-from .view import USUAL_LEVEL, Shown, ToolName
+from .view import USUAL_LEVEL, Hover, Shown, ToolName
 
 
 class Editor(EditorState):

@@ -19,7 +19,7 @@ from ..canvas.shape import Shapes, build_ready
 from ..system.texts import t
 from ..worker.requests import JobError
 from .autosave import LOCK, FileLock, HeldJournal, recovery_root
-from .feedback import Action
+from .view import Action
 
 if TYPE_CHECKING:
     from .state import EditorState

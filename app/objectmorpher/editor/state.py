@@ -24,11 +24,10 @@ from ..worker.jobs import Jobs
 from ..worker.requests import JobError
 from ..worker.threads import Chores
 from .autosave import Autosave
-from .feedback import Action, Hover, StatusMessage
 from .history import History
 from .settings import Settings
 from .tab import Tab
-from .view import ViewState
+from .view import Action, Hover, StatusMessage, ViewState
 
 
 class EditorState:

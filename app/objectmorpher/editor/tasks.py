@@ -34,8 +34,7 @@ from ..system.texts import folder_of, t
 from ..worker import job_functions
 from ..worker.job_functions import BackendChoice, Cut
 from ..worker.requests import JobError
-from .feedback import Action
-from .view import SelectMode, ToolName
+from .view import Action, SelectMode, ToolName
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit

@@ -6,13 +6,18 @@ in framebuffer px. Image px: the photo's own.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.base.camera import Camera
+
+if TYPE_CHECKING:
+    from objectmorpher_core.deform.puppet import SurfacePoint
 
 # What the Pose tool does now, and which of its marks are shown: neither saved nor undone.
 
@@ -249,3 +254,36 @@ class ViewState:
         rest = KEEP_VISIBLE * self.scale / self.zoom
         self.left = float(np.clip(self.left, rest - self.width / self.zoom, photo[0] - rest))
         self.top = float(np.clip(self.top, rest - self.height / self.zoom, photo[1] - rest))
+
+
+# Feedback of the editor: a sentence for the status line, and the thing under the pointer.
+
+
+@dataclass(frozen=True)
+class Action:
+    """A button beside a message that does something about it."""
+
+    label: str
+    run: Callable[[], None]
+
+
+@dataclass(frozen=True)
+class StatusMessage:
+    """A sentence for the status line."""
+
+    text: str
+    is_error: bool = False
+    details: str = ""
+    action: Action | None = None
+
+
+@dataclass(frozen=True)
+class Hover:
+    """The thing under the pointer."""
+
+    handle: int | None = None
+    surface: SurfacePoint | None = None
+    is_pin: bool = False  # a click would set a pin
+    part: str | None = None  # of the Place tool's frame
+    place: tuple[float, float] | None = None  # image px, where a click would select something
+    other: int | None = None  # index of the object that a click would make the current one

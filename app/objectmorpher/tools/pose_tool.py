@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..editor.feedback import Hover
-from ..editor.view import BRUSHES, PoseMode
+from ..editor.view import BRUSHES, Hover, PoseMode
 from ..system.texts import t
 from . import pose_strokes
 from .pointer import Button, Pointer, PointerShape, Stroke, ignore

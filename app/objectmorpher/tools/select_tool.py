@@ -8,9 +8,8 @@ import numpy as np
 
 from objectmorpher_core.segment import UNSURE
 
-from ..editor.feedback import Hover
 from ..editor.tasks import Combine
-from ..editor.view import SelectMode
+from ..editor.view import Hover, SelectMode
 from ..system.texts import t
 from .pointer import Button, Pointer, PointerShape, Stroke, draw_box, ignore
 

@@ -23,9 +23,8 @@ from ...system.texts import t
 from ...worker import job_functions
 from ...worker.job_functions import BackendChoice, Variant
 from ...worker.requests import JobError
-from ..feedback import Action
 from ..tasks import PLATE
-from ..view import ToolName, ViewState
+from ..view import Action, ToolName, ViewState
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import PlatePatch

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from ...server.elsewhere import Elsewhere
 from ...system.texts import t
 from ...worker.requests import JobError
-from ..feedback import Action
 from ..settings import SERVER, settings_path
+from ..view import Action
 
 if TYPE_CHECKING:
     from ...server.address import Server

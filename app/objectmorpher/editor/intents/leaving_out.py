@@ -15,7 +15,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Plate
 
 from ...system.texts import t
-from ..feedback import Action
+from ..view import Action
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.residue import Ghost

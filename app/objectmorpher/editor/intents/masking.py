@@ -24,9 +24,8 @@ from ...system.texts import folder_of, t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
-from ..feedback import Action
 from ..tasks import SELECT, WRITE
-from ..view import ToolName
+from ..view import Action, ToolName
 
 if TYPE_CHECKING:
     from ..state import EditorState

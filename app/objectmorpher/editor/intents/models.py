@@ -16,7 +16,7 @@ from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Wei
 from ...system.texts import t
 from ...worker import job_functions
 from ...worker.requests import JobError
-from ..feedback import Action
+from ..view import Action
 from .methods import Workers
 
 if TYPE_CHECKING:

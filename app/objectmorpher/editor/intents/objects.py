@@ -13,9 +13,8 @@ from objectmorpher_core.document.model import Document
 
 from ...canvas.layer import is_front
 from ...system.texts import t
-from ..feedback import Action
 from ..tasks import LIFT, SELECT
-from ..view import USUAL_LEVEL, ToolName
+from ..view import USUAL_LEVEL, Action, ToolName
 
 if TYPE_CHECKING:
     from ..state import EditorState

@@ -13,10 +13,9 @@ from imgui_bundle import ImVec2, imgui
 
 from ...commands import next_step, run, take_next_step
 from ...editor.editor import Editor
-from ...editor.feedback import Hover
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.shortcuts import Shortcuts
-from ...editor.view import CHANGING, ToolName
+from ...editor.view import CHANGING, Hover, ToolName
 from ...system.texts import t
 from ...tools import navigate
 from ...tools.pointer import Button, Pointer, PointerShape

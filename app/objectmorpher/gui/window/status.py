@@ -7,8 +7,8 @@ import time
 from imgui_bundle import ImVec2, imgui
 
 from ...editor.editor import Editor
-from ...editor.feedback import StatusMessage
 from ...editor.intents.models import DOWNLOAD
+from ...editor.view import StatusMessage
 from ...system.report import without_names
 from ...system.texts import t
 from ...worker.requests import Executor, Request
