@@ -28,7 +28,6 @@ from .intents.exporting import COPY, Exporting
 from .intents.hinting import Hinting
 from .intents.keying import Keying
 from .intents.landing import Landing
-from .intents.leaving_out import LeavingOut
 from .intents.looking import LookingIntents
 from .intents.masking import Masking
 from .intents.methods import Methods
@@ -41,7 +40,7 @@ from .intents.posing import HandleNumbers, Posing
 from .intents.refining import RefiningIntents
 from .intents.rigging import Rigging
 from .intents.sample import SampleOpening
-from .intents.selection import Selection
+from .intents.selection import LeavingOut, Selection
 from .intents.shaping import Shaping
 from .recovery import Recovery
 from .refits import Refits
