@@ -19,7 +19,7 @@ from ..system.freed_memory import give_back
 from ..system.texts import t
 from ..worker.jobs import RELUCTANCE
 from .candidate import Candidates, CloserLook
-from .filing import OPEN, Dialog, Filing
+from .filing import OPEN, Dialog, Filing, SampleOpening
 from .history import History
 from .intents.composing import Composing
 from .intents.computing import Computing
@@ -39,7 +39,6 @@ from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
 from .intents.refining import RefiningIntents
 from .intents.rigging import Rigging
-from .intents.sample import SampleOpening
 from .intents.selection import LeavingOut, Selection
 from .intents.shaping import Shaping
 from .recovery import Recovery
