@@ -32,9 +32,8 @@ from .intents.looking import LookingIntents
 from .intents.masking import Masking
 from .intents.methods import Methods
 from .intents.models import Models
-from .intents.objects import Objects
+from .intents.objects import Objects, Pasting
 from .intents.painting import Painting
-from .intents.pasting import Pasting
 from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
 from .intents.refining import RefiningIntents
