@@ -309,6 +309,6 @@ def _piece(mask: Mask, x: int, y: int) -> Mask:
 
 def _softness(mask: Mask, soft: Mask) -> float:
     """How far, in px, what is soft (H, W) reaches from the mask's edge."""
-    from .matting.matte import signed_distance
+    from .matting.soft_edge import signed_distance
 
     return 1.0 + float(np.abs(signed_distance(mask))[soft].max(initial=0.0))
