@@ -13,9 +13,8 @@ from ...document.model import LiftSettings
 from .canvas import bilinear
 from .cuts import Behind, Cuts, Overlaps, overlaps_of
 from .mirror import MirrorAxis
-from .prism import Prism
 from .silhouette import ReliefSilhouette
-from .standing import FLAT, StandingSheet, stand
+from .standing import FLAT, Prism, StandingSheet, stand
 from .thickness import Thickness
 
 FRONT, BACK, MIDDLE = 1.0, -1.0, 0.0  # a sheet, as the share of the thickness it lies in front

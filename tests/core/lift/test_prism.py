@@ -8,8 +8,8 @@ import pytest
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.relief.body import FRONT, ReliefBody
-from objectmorpher_core.lift.relief.prism import PrismSides, find_prism
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
+from objectmorpher_core.lift.relief.standing import PrismSides, find_prism
 from tests import shapes
 from tests.core.lift.standing_things import Box, View, cylinder, figure
 from tests.tree import over

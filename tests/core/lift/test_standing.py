@@ -8,9 +8,15 @@ import pytest
 
 from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.lift.relief.prism import GroundPlane
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
-from objectmorpher_core.lift.relief.standing import FLAT, LEAST_DEPTH, TRUST, StandingSheet, stand
+from objectmorpher_core.lift.relief.standing import (
+    FLAT,
+    LEAST_DEPTH,
+    TRUST,
+    GroundPlane,
+    StandingSheet,
+    stand,
+)
 from tests.core.lift.standing_things import View, figure
 
 EXACT = 1e-9
