@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from objectmorpher.system.early_network import open_early
+from objectmorpher.system.warm_up import open_early
 from objectmorpher_core import models
 from objectmorpher_core.segment import dino_tokens, salience
 
@@ -18,7 +18,7 @@ PHOTO = ROOT / "assets/samples/coffee.jpg"
 TOLD = """
 import sys
 from pathlib import Path
-from objectmorpher.system.early_network import open_early
+from objectmorpher.system.warm_up import open_early
 for photo, segmenter in zip(sys.argv[1::2], sys.argv[2::2]):
     opening = open_early(Path(photo), segmenter or None, True)
     if opening is None:

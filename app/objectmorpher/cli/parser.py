@@ -413,7 +413,7 @@ def _on_photo(
     command = _command(name, help, add_options)
 
     def run(options: argparse.Namespace) -> None:
-        from ..system.early_network import open_early
+        from ..system.warm_up import open_early
 
         is_seen = bool(options.click or options.box or options.subject) and not options.mask
         open_early(options.photo, options.segment, is_seen)
