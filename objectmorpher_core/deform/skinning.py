@@ -24,7 +24,7 @@ times the weights and their gradients. At rest each term is 0, however far the o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -159,6 +159,16 @@ class Skinned:
     linear: F64  # (N, 3, 3) Jacobian of the motion there: F
 
 
+class SkinArrays(NamedTuple):
+    """Points with what moves them, as kernels take them."""
+
+    points: F64  # (N, 3) at rest, object frame
+    control_points: np.ndarray  # (N, neighbours) u32
+    shares: F64  # see `Binding.shares`
+    nodes: F64  # (M, 8), see `nodes_of`
+    frame: F64  # (2, 3), likewise
+
+
 @dataclass(frozen=True, eq=False)
 class Skin:
     """Points with what moves them: a motion that has not been carried out yet."""
@@ -167,19 +177,19 @@ class Skin:
     binding: Binding
     motion: Motion
 
-    def inputs(self) -> tuple[Any, ...]:
-        """Return the input of `skin_block`: x, control points, shares, nodes, frame."""
-        x = frozen(np.atleast_2d(self.points), np.float64)
-        nodes = frozen(self.binding.control_points.view(np.uint32))
-        return x, nodes, self.binding.shares, *nodes_of(self.motion)
+    def arrays(self) -> SkinArrays:
+        """Return the input of `skin_block`."""
+        points = frozen(np.atleast_2d(self.points), np.float64)
+        control_points = frozen(self.binding.control_points.view(np.uint32))
+        return SkinArrays(points, control_points, self.binding.shares, *nodes_of(self.motion))
 
     def run(self) -> Skinned:
         """The points after the motion, and its Jacobian."""
         count = len(np.atleast_2d(self.points))
         moved, linear = np.empty((count, 3)), np.empty((count, 3, 3))
-        inputs: tuple[Any, ...] = (*self.inputs(), moved, linear)
+        arrays = self.arrays()
         in_threads(
-            lambda first, last: _skin(first, last, *inputs),
+            lambda first, last: _skin(first, last, arrays, moved, linear),
             len(self.binding.shares), least=LEAST_ROWS // LANES,
         )  # fmt: skip
         return Skinned(moved, linear)
@@ -257,39 +267,41 @@ def _quat(r, j):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _skin(first, last, x, control_points, shares, nodes, frame, moved, linear):
+def _skin(first, last, skin, moved, linear):
     """Blocks first..last of the rows of `Skinned`."""
     s = np.ones(ROWS * LANES)
     left, right, one = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for block in range(first, last):
         start = block * LANES
-        count = min(LANES, len(x) - start)
-        skin_block(block, count, x, control_points, shares, nodes, frame, s, left, right, one)
+        count = min(LANES, len(skin.points) - start)
+        skin_block(block, count, skin, s, left, right, one)
         for lane in range(count):
             i, k = np.uint64(start + lane), np.uint64(lane)  # unsigned: no look at their signs
             for a in range(3):
-                moved[i, a] = x[i, a] + (frame[1, a] + s[np.uint64((SHIFT + a) * LANES) + k])
+                moved[i, a] = skin.points[i, a] + (
+                    skin.frame[1, a] + s[np.uint64((SHIFT + a) * LANES) + k]
+                )
                 for b in range(3):
                     linear[i, a, b] = s[np.uint64((LINEAR + 3 * a + b) * LANES) + k]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def skin_block(block, count, x, control_points, shares, nodes, frame, s, left, right, one):
-    """Fills the rows SHIFT (without frame[1]) and LINEAR of `s` for the `count` points of a block.
+def skin_block(block, count, skin, s, left, right, one):
+    """Fills the rows SHIFT (without skin.frame[1]) and LINEAR of `s` for `count` points.
 
     `left`, `right`, `one` (3, 3) are room to work in.
     """
     start = block * LANES
     for m in range(4 * NEIGHBOURS * LANES):
-        s[SHARES * LANES + m] = shares[block, m]
+        s[SHARES * LANES + m] = skin.shares[block, m]
     for lane in range(count):
         i, k = np.uint64(start + lane), np.uint64(lane)  # unsigned: no look at their signs
         for c in range(NEIGHBOURS):
-            j = np.uint64(control_points[i, c])
+            j = np.uint64(skin.control_points[i, c])
             for a in range(8):
-                s[np.uint64((NODES + 8 * c + a) * LANES) + k] = nodes[j, a]
+                s[np.uint64((NODES + 8 * c + a) * LANES) + k] = skin.nodes[j, a]
         for a in range(3):
-            s[np.uint64((PLACE + a) * LANES) + k] = 2.0 * (x[i, a] - frame[0, a])
+            s[np.uint64((PLACE + a) * LANES) + k] = 2.0 * (skin.points[i, a] - skin.frame[0, a])
     _blend(s)
     for k in range(count):
         if s[MARGIN * LANES + k] <= 0.0:

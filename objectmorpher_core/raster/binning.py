@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,19 @@ class Bins:
     members: np.ndarray  # (starts[-1],) u32 rows of the projected Gaussians
     across: int  # tiles
     down: int
+
+
+class TiledSplats(NamedTuple):
+    """Projected Gaussians and a part of the view that is cut into tiles, as kernels take them."""
+
+    projected: F32  # (N, SPAN), see `projection`
+    starts: np.ndarray  # as in `Bins`
+    members: np.ndarray
+    across: int
+    left: int  # px of the view, where the part begins
+    top: int
+    width: int  # px of the part
+    height: int
 
 
 def bin_tiles(

@@ -47,23 +47,21 @@ BATCH_ROWS = p.PLAIN_SPAN + 13
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def draw_one_by_one(
-    first, last, projected, starts, members, across, left, top, width, height, rules, kind, out,
-    rgba,
-):  # fmt: skip
+def draw_one_by_one(first, last, tiles, rules, kind, out, rgba):
     """Draws the tiles first..last of `out` or `rgba`; see `surface.draw_layers`."""
+    projected, starts, members = tiles.projected, tiles.starts, tiles.members
     s = np.zeros(ROWS * PIXELS, np.float32)
     batch = np.ones(BATCH_ROWS * int(BATCH), np.float32)
     packed = np.empty(PIXELS if len(rgba) > 0 else 0, np.uint32)
     number_pixels(s, STEP_X, STEP_Y, PIXELS, TALL)
     through = ONE - np.float32(rules.opaque)
     for tile in range(first, last):
-        column, row = (tile % across) * WIDE, (tile // across) * TALL
-        rows, columns = min(TALL, height - row), min(WIDE, width - column)
+        column, row = (tile % tiles.across) * WIDE, (tile // tiles.across) * TALL
+        rows, columns = min(TALL, tiles.height - row), min(WIDE, tiles.width - column)
         if starts[tile] == starts[tile + 1]:
             clear_tile(out, rgba, column, row, columns, rows)
             continue
-        x0, y0 = np.float32(left + column) + HALF, np.float32(top + row) + HALF
+        x0, y0 = np.float32(tiles.left + column) + HALF, np.float32(tiles.top + row) + HALF
         for k in range(ALL):
             s[CLEAR + k] = ONE
             s[R + k] = s[G + k] = s[B + k] = s[MEAN + k] = s[MEDIAN + k] = ZERO

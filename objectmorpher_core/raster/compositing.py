@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from ..base.arrays import F32, F64
 from ..base.kernel_files import numba
 from ..base.threads import EXACT, FAST
 from . import tile_memory as m
@@ -18,20 +20,30 @@ from .sampling import C15, C25, add_halved, sample
 HIGHEST = np.float32(1e6)  # px: what looks farther away looks at nothing
 
 
+class PhotoLookup(NamedTuple):
+    """The photo that a picture's pixels look at, and the two cameras."""
+
+    screen: F64  # focal length, cx, cy, width, height of the view, px
+    photo: F64  # the same of the photo
+    texels: F32  # see `TextureLevels`
+    shapes: np.ndarray
+    left: float  # px in the photo, corner of the texels
+    top: float
+
+
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
-def look_up(
-    s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top
-):  # fmt: skip
+def look_up(s, left, top, columns, first, last, lookup):
     """Fills T_R to T_A and WITHIN where IS_PHOTO is 1, 0 elsewhere; on the rows first..last.
 
     The tile's first pixel is (left, top) of the view; it has so many columns.
     """
-    ratio = photo[0] / view[0]
-    x0 = (left + 0.5 - view[1]) * ratio + photo[1]  # of the photo
-    y0 = (top + 0.5 - view[2]) * ratio + photo[2]
+    photo, texels, shapes = lookup.photo, lookup.texels, lookup.shapes
+    ratio = photo[0] / lookup.screen[0]
+    x0 = (left + 0.5 - lookup.screen[1]) * ratio + photo[1]  # of the photo
+    y0 = (top + 0.5 - lookup.screen[2]) * ratio + photo[2]
     # where the crop's pixel indices are counted from: near the tile, so that 32 bits suffice
-    near_x, near_y = math.floor(x0 - crop_left - 0.5), math.floor(y0 - crop_top - 0.5)
-    photo_x, photo_y = crop_left + near_x + 0.5, crop_top + near_y + 0.5
+    near_x, near_y = math.floor(x0 - lookup.left - 0.5), math.floor(y0 - lookup.top - 0.5)
+    photo_x, photo_y = lookup.left + near_x + 0.5, lookup.top + near_y + 0.5
     for strip in range(m.STRIPS):
         start, end = m.strip_pixels(strip, first, last)
         _prepare(
@@ -97,8 +109,7 @@ LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def composite_layer(
-    s, layer, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top,
-    rules, kind, has_sides,
+    s, layer, left, top, columns, first, last, lookup, rules, kind, has_sides
 ):  # fmt: skip
     """Puts the layer behind what is there already, on the rows first..last of the tile.
 
@@ -114,13 +125,11 @@ def composite_layer(
     for strip in range(m.STRIPS):
         start, end = m.strip_pixels(strip, first, last)
         _settle(s, start, end, edged)
-    look_up(s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top)
+    look_up(s, left, top, columns, first, last, lookup)
     if has_sides:
         for strip in range(m.STRIPS):
             _set_aside(s, *m.strip_pixels(strip, first, last))
-        look_up(
-            s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top
-        )
+        look_up(s, left, top, columns, first, last, lookup)
         for strip in range(m.STRIPS):
             _mix_sides(s, *m.strip_pixels(strip, first, last), closing)
     visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)

@@ -17,7 +17,7 @@ from ..base.kernel_files import numba
 from ..base.threads import FAST, in_threads
 from ..deform import skinning
 from ..deform.binding import LANES
-from ..deform.skinning import LINEAR, SHIFT, Skin, Skinned, skin_block
+from ..deform.skinning import LINEAR, SHIFT, Skin, SkinArrays, Skinned, skin_block
 from . import rules as p
 from .posed import (
     COLOUR,
@@ -340,7 +340,7 @@ def project(
     return out
 
 
-_NO_SKIN = (
+_NO_SKIN = SkinArrays(
     frozen(np.zeros((0, 3))), frozen(np.zeros((0, 4), np.uint32)), frozen(np.zeros((0, 0))),
     frozen(np.zeros((0, 8))), frozen(np.zeros((2, 3))),
 )  # fmt: skip
@@ -352,25 +352,24 @@ def _motion(splats: PosedSplats) -> tuple[Any, ...]:
     """What moves the Gaussians, as the kernel takes it: one of three, the others empty."""
     motion = splats.motion
     if isinstance(motion, Skin):
-        return (*motion.inputs(), *_NO_POINTS)
+        return motion.arrays(), *_NO_POINTS
     if isinstance(motion, Skinned):
         points, linear = frozen(motion.points, np.float64), frozen(motion.linear, np.float64)
-        return (*_NO_SKIN, points, linear)
-    return (*_NO_SKIN, *_NO_POINTS)
+        return _NO_SKIN, points, linear
+    return _NO_SKIN, *_NO_POINTS
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _project(
-    first, last, x, control_points, shares, nodes, centre, points, linear,
-    rest, sides, frame, rules, kind, is_textured, out, depths,
+    first, last, skin, points, linear, rest, sides, frame, rules, kind, is_textured, out, depths
 ):  # fmt: skip
     """Fills the rows of `out` that belong to the blocks first..last."""
     s = np.ones(ROWS * LANES)
     left, right, one = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     drift = np.zeros(3)
-    if len(x) > 0:
+    if len(skin.points) > 0:
         for a in range(3):
-            drift[a] = centre[1, a]
+            drift[a] = skin.frame[1, a]
     else:
         for row in range(SHIFT, SHIFT + 3):
             s[row * LANES : (row + 1) * LANES] = 0.0
@@ -382,8 +381,8 @@ def _project(
         start = block * LANES
         count = min(LANES, len(out) - start)
         base = block * REST_ROWS * LANES
-        if len(x) > 0:
-            skin_block(block, count, x, control_points, shares, nodes, centre, s, left, right, one)
+        if len(skin.points) > 0:
+            skin_block(block, count, skin, s, left, right, one)
         elif len(points) > 0:
             for k in range(count):
                 for a in range(3):

@@ -7,7 +7,7 @@ it is interpolated to the view's own, and the photo is looked up through it at f
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,17 +61,42 @@ def sharpen(
     # Texels at the box's first px, and per view px.
     left = scale * (corner[0] + (box[0] + 0.5) / zoom - texture.left) - 0.5
     top = scale * (corner[1] + (box[1] + 0.5) / zoom - texture.top) - 0.5
-    frame = (factor, left, top, scale / zoom, scale)
     u = (np.arange(width) + 0.5) / factor - 0.5  # where each px is among the coarse ones
     pixels = np.floor(u).clip(0, coarse.shape[1] - 1)
-    inputs: tuple[Any, ...] = (
-        coarse.reshape(len(coarse), -1), ends, *(np.float32(v) for v in frame),
-        texture.texels, texture.shapes[level],
-        (8 * pixels).astype(np.uint64), (u - pixels).clip(0, 1).astype(np.float32), rgba, invented,
-        is_marked,
+    own = CoarseRows(
+        coarse.reshape(len(coarse), -1), ends,
+        (8 * pixels).astype(np.uint64), (u - pixels).clip(0, 1).astype(np.float32),
     )  # fmt: skip
-    in_threads(lambda first, last: _sharpen(first, last, *inputs), height, PARTS)
+    fine = FineTexels(
+        np.float32(factor), np.float32(left), np.float32(top), np.float32(scale / zoom),
+        np.float32(scale), texture.texels, texture.shapes[level],
+    )  # fmt: skip
+    in_threads(
+        lambda first, last: _sharpen(first, last, own, fine, rgba, invented, is_marked),
+        height, PARTS,
+    )  # fmt: skip
     return rgba.view(np.uint8).reshape(height, width, 4), invented if is_marked else None
+
+
+class CoarseRows(NamedTuple):
+    """A coarse picture, and where a view's columns lie in it, as the kernel takes them."""
+
+    numbers: F32  # (rows, 8 x columns), see `_packed`
+    ends: I32  # likewise
+    pixels: np.ndarray  # u64, of each column of the view the coarse px before it, x 8, ...
+    shares: F32  # ... and how much it takes of the next
+
+
+class FineTexels(NamedTuple):
+    """The copy of the photo that is looked up, as the kernel takes it."""
+
+    factor: np.float32  # px of the view in a coarse one
+    left: np.float32  # texels at the box's first px
+    top: np.float32
+    step: np.float32  # texels per px of the view
+    scale: np.float32  # texels per px of the photo
+    texels: F32
+    shape: np.ndarray  # height, width and first texel
 
 
 def _packed(picture: Picture3D, limit: float) -> tuple[F32, I32]:
@@ -149,18 +174,12 @@ def _continue(coarse, ends):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _sharpen(
-    first, last, coarse, ends, factor, left, top, step, scale, texels, shape, pixels, shares,
-    rgba, invented, is_marked,
-):  # fmt: skip
-    """Rows first..last of `rgba` and `invented`, all 0 before.
-
-    `coarse` (rows, 8 x columns), `ends`: see `_packed`; `pixels`, `shares`: of each column the
-    coarse px before it, and how much it takes of the next.
-    """
+def _sharpen(first, last, own, fine, rgba, invented, is_marked):
+    """Rows first..last of `rgba` and `invented`, all 0 before."""
+    coarse, ends, factor = own.numbers, own.ends, fine.factor
     rows, numbers = coarse.shape
     row, most = np.empty(numbers, np.float32), np.uint64(numbers - 8)
-    down, across, first_texel = shape
+    down, across, first_texel = fine.shape
     stride = np.uint64(4 * across)
     right, bottom = np.float32(across - 1), np.float32(down - 1)
     for y in range(first, last):
@@ -172,22 +191,22 @@ def _sharpen(
             row[c] = coarse[i, c] + t * (coarse[below, c] - coarse[i, c])
         start, end = int(factor) * (start - 1), int(factor) * (end + 1)
         for x in range(max(start, 0), min(end, rgba.shape[1])):
-            one = pixels[x]
+            one = own.pixels[x]
             two = min(one + EIGHT, most)
             if row[one + A_ON] <= ZERO and row[two + A_ON] <= ZERO:
                 continue
-            r, g, b, a, share, shift_x, shift_y, _ = between(row, one, two, shares[x])
+            r, g, b, a, share, shift_x, shift_y, _ = between(row, one, two, own.shares[x])
             if is_marked:
                 invented[y, x] = np.uint8(np.int32((ONE - share) * a * FULL + HALF))
             texel, alpha, rest = (ZERO, ZERO, ZERO, ZERO), ZERO, ONE - share
             if share > ZERO:
-                u = left + np.float32(x) * step + scale * shift_x
-                v = top + np.float32(y) * step + scale * shift_y
+                u = fine.left + np.float32(x) * fine.step + fine.scale * shift_x
+                v = fine.top + np.float32(y) * fine.step + fine.scale * shift_y
                 if ZERO <= u < right and ZERO <= v < bottom:
                     column, line = np.int32(u), np.int32(v)
                     at = np.uint64(4 * (first_texel + line * across + column))
                     share_x, share_y = u - np.float32(column), v - np.float32(line)
-                    texel = four_texels(texels, at, stride, share_x, share_y)
+                    texel = four_texels(fine.texels, at, stride, share_x, share_y)
                     alpha = texel[3] * min(TWO * a, ONE) * share
             if a > INNER:  # no edge of the cut-out: what is not found there has its coarse colour
                 rest = ONE - alpha

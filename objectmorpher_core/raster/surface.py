@@ -74,11 +74,10 @@ def is_plain(g, rules):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def draw_smooth(
-    s, nodes, projected, members, left, top, columns, rows, view, photo, texels, shapes,
-    crop_left, crop_top, kind,
+    s, nodes, projected, members, left, top, columns, rows, lookup, kind
 ):  # fmt: skip
     """Draws the tile, unless its surface turns out not to be whole: whether it did."""
-    _fetch(projected[members[0]], left, top, view, photo, texels, shapes, crop_left, crop_top)
+    _fetch(projected[members[0]], left, top, lookup)
     for k in range(TOTAL, NODE_X):
         nodes[k] = ZERO
     for i in members:
@@ -95,7 +94,7 @@ def draw_smooth(
     _spread(nodes, DEPTH, s, m.O_DEPTH)
     for k in range(m.ALL):
         s[m.IS_PHOTO + k] = s[m.MAG + k] = ONE
-    look_up(s, left, top, columns, 0, rows, view, photo, texels, shapes, crop_left, crop_top)
+    look_up(s, left, top, columns, 0, rows, lookup)
     for k in range(m.ALL):
         alpha = s[m.T_A + k]
         s[m.O_R + k], s[m.O_G + k] = alpha * s[m.T_R + k], alpha * s[m.T_G + k]
@@ -106,24 +105,25 @@ def draw_smooth(
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _fetch(g, left, top, view, photo, texels, shapes, crop_left, crop_top):
+def _fetch(g, left, top, lookup):
     """Asks for the texels that will be looked up, where a Gaussian says that the tile looks.
 
     The sums are computed while they come: without it a third of a frame is spent waiting.
     """
     half = HALF * np.float32(TILE)
     dx, dy = np.float32(left) + half - g[p.CX], np.float32(top) + half - g[p.CY]
-    ratio = photo[0] / view[0]
-    x = (left + TILE / 2 - view[1]) * ratio + photo[1] - crop_left
-    y = (top + TILE / 2 - view[2]) * ratio + photo[2] - crop_top
+    screen, photo = lookup.screen, lookup.photo
+    ratio = photo[0] / screen[0]
+    x = (left + TILE / 2 - screen[1]) * ratio + photo[1] - lookup.left
+    y = (top + TILE / 2 - screen[2]) * ratio + photo[2] - lookup.top
     x += g[p.SX] + g[p.AXX] * dx + g[p.AXY] * dy
     y += g[p.SY] + g[p.AYX] * dx + g[p.AYY] * dy
-    height, width = shapes[0, 0], shapes[0, 1]
+    height, width = lookup.shapes[0, 0], lookup.shapes[0, 1]
     column = min(max(int(x) - TILE // 2 - 2, 0), width - 1)
     for row in range(max(int(y) - TILE // 2 - 2, 0), min(int(y) + TILE // 2 + 2, height)):
         first = np.uint64(4 * (row * width + column))
         for line in range(LINES):
-            fetch(texels, first + line * LINE)
+            fetch(lookup.texels, first + line * LINE)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
@@ -189,17 +189,12 @@ MIDDLE = np.float32(TILE / 2)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def draw_layers(
-    first, last, projected, starts, members, across, left, top, width, height, view, photo,
-    gap, texture_gap, texels, shapes, crop_left, crop_top, rules, kind, out, rgba,
-):  # fmt: skip
+def draw_layers(first, last, tiles, lookup, gap, texture_gap, rules, kind, out, rgba):
     """Draws the tiles first..last of `out` (height, width, 8) f32 or of `rgba` (..) u32.
 
     The one that is not wanted is empty. A number of `rgba` is four bytes, the first the lowest.
-
-    `left`, `top`: the pixel of the view at which `out` begins. `view`, `photo`: focal, cx, cy,
-    width, height of the view and of the photo, px.
     """
+    projected, starts, across = tiles.projected, tiles.starts, tiles.across
     s = np.zeros(m.ROWS * m.PIXELS, np.float32)
     m.number_pixels(s, m.STEP_X, m.STEP_Y, m.PIXELS)
     packed = np.empty(m.PIXELS if len(rgba) > 0 else 0, np.uint32)
@@ -209,24 +204,23 @@ def draw_layers(
     for tile in range(first, last):
         begin, end = starts[tile], starts[tile + 1]
         column, row = (tile % across) * TILE, (tile // across) * TILE
-        rows, columns = min(TILE, height - row), min(TILE, width - column)
+        rows, columns = min(TILE, tiles.height - row), min(TILE, tiles.width - column)
         if begin == end:
             m.clear_tile(out, rgba, column, row, columns, rows)
             continue
-        own = members[begin:end]
-        x0, y0 = np.float32(left + column), np.float32(top + row)
+        own, left, top = tiles.members[begin:end], tiles.left + column, tiles.top + row
+        x0, y0 = np.float32(left), np.float32(top)
         # Of other assets even what is no front counts, where there is a front.
         is_one = kind.is_surface and _is_one_layer(projected, own, x0, y0, limits)
         is_done = False
         if is_one and _are_plain(projected, own, rules):
             is_done = draw_smooth(
-                s, nodes, projected, own, left + column, top + row, columns, rows, view, photo,
-                texels, shapes, crop_left, crop_top, kind,
+                s, nodes, projected, own, left, top, columns, rows, lookup, kind
             )  # fmt: skip
         if not is_done:
             _draw_tile(
-                s, room, projected, own, is_one, left + column, top + row, columns, rows, limits,
-                view, photo, texels, shapes, crop_left, crop_top, rules, kind,
+                s, room, projected, own, is_one, left, top, columns, rows, limits, lookup, rules,
+                kind,
             )  # fmt: skip
         if len(rgba) > 0:
             m.write_rgba(s, m.O_R, packed, rgba, column, row, columns, rows)
@@ -240,8 +234,7 @@ def draw_layers(
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _draw_tile(
-    s, room, projected, members, is_one, left, top, columns, rows, limits, view, photo, texels,
-    shapes, crop_left, crop_top, rules, kind,
+    s, room, projected, members, is_one, left, top, columns, rows, limits, lookup, rules, kind
 ):  # fmt: skip
     """Layer by layer, until nothing is left that could be seen.
 
@@ -272,8 +265,7 @@ def _draw_tile(
                 kept += 1
         count = kept
         first, last = composite_layer(
-            s, layer, left, top, columns, first, last, view, photo, texels, shapes, crop_left,
-            crop_top, rules, kind, aside > ZERO,
+            s, layer, left, top, columns, first, last, lookup, rules, kind, aside > ZERO
         )  # fmt: skip
         if is_one or first >= last:
             return

@@ -15,8 +15,9 @@ import numpy as np
 from ..base.arrays import F32, F64, frozen
 from ..base.camera import Camera
 from ..base.threads import in_threads
-from .binning import TILE, bin_tiles
+from .binning import TILE, TiledSplats, bin_tiles
 from .cloud import TALL, WIDE, draw_one_by_one
+from .compositing import PhotoLookup
 from .depth_order import depth_order
 from .posed import PosedSplats
 from .projection import project
@@ -98,20 +99,21 @@ def _draw(
     height, width = max(out.shape[0], rgba.shape[0]), max(out.shape[1], rgba.shape[1])
     window = (*corner, width, height)
     bins = bin_tiles(drawable.projected, window, tile_size(splats), drawable.order)
-    where: tuple[Any, ...] = (
-        drawable.projected, frozen(bins.starts), frozen(bins.members), bins.across,
-        *corner, width, height,
-    )  # fmt: skip
+    tiled = TiledSplats(
+        drawable.projected, frozen(bins.starts), frozen(bins.members), bins.across, *window
+    )
+    inputs: tuple[Any, ...] = RULES, kind, out, rgba
+    kernel = draw_one_by_one
     if splats.is_layered:
-        inputs = (
-            *where, _intrinsics(drawable.camera), _intrinsics(drawable.photo_camera),
-            float(splats.gap), float(splats.texture_gap), texture.texels, texture.shapes,
-            float(texture.left), float(texture.top), RULES, kind, out, rgba,
+        lookup = PhotoLookup(
+            _intrinsics(drawable.camera), _intrinsics(drawable.photo_camera), texture.texels,
+            texture.shapes, float(texture.left), float(texture.top),
         )  # fmt: skip
+        inputs = lookup, float(splats.gap), float(splats.texture_gap), *inputs
         kernel = draw_layers
-    else:
-        inputs, kernel = (*where, RULES, kind, out, rgba), draw_one_by_one
-    in_threads(lambda first, last: kernel(first, last, *inputs), bins.across * bins.down, PARTS)
+    in_threads(
+        lambda first, last: kernel(first, last, tiled, *inputs), bins.across * bins.down, PARTS
+    )
 
 
 def render(

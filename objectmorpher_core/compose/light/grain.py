@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -51,6 +51,19 @@ COARSEST = 6  # how often the tile is halved for what is shown smaller
 LEAST_ROWS = 64  # of a picture, for which a second thread is woken
 
 
+class PlacedNoise(NamedTuple):
+    """The noise that a kernel adds to a picture (h, w), how much of it, and where they lie."""
+
+    tile: F32  # (bands, n, n, 3)
+    ys: np.ndarray  # (h,) row of the tile of each row of the picture
+    xs: np.ndarray  # (w,) likewise its column
+    amount: F32  # as `Grain.padded`
+    rows: np.ndarray  # (h,) row of the amount before it, and
+    down: F32  # how much it takes of the next
+    columns: np.ndarray  # (w,) and the same of columns
+    across: F32
+
+
 @dataclass(frozen=True, eq=False)
 class Grain:
     """Noise to be added to the picture of an object."""
@@ -69,7 +82,7 @@ class Grain:
         out = np.empty(colour.shape, np.float32)
         table, places = self.noise.deviation, self._places(alpha.shape, left, top, 1.0)
         pixels = np.ascontiguousarray(colour), np.ascontiguousarray(alpha)
-        inputs: tuple[Any, ...] = *pixels, table, *places, out
+        inputs: tuple[Any, ...] = *pixels, table, places, out
         in_threads(lambda a, b: _add(a, b, *inputs), len(out), 2, LEAST_ROWS)
         return out
 
@@ -78,7 +91,7 @@ class Grain:
         packed = np.ascontiguousarray(rgba).view("<u4")[..., 0]
         out = np.empty_like(packed)
         table, places = self.noise.deviation, self._places(packed.shape, left, top, zoom)
-        inputs: tuple[Any, ...] = packed, table, *places, out
+        inputs: tuple[Any, ...] = packed, table, places, out
         in_threads(lambda a, b: _add_bytes(a, b, *inputs), len(out), 2, LEAST_ROWS)
         return out.view(np.uint8).reshape(rgba.shape)
 
@@ -87,8 +100,8 @@ class Grain:
         """(h + 2, w + 2, BANDS) the amounts, with their own border around them."""
         return frozen(np.pad(self.amount, ((1, 1), (1, 1), (0, 0)), mode="edge"))
 
-    def _places(self, shape: tuple[int, ...], left: float, top: float, zoom: float) -> Any:
-        """What a kernel adds to a picture (h, w): noise, how much of it, and where they lie."""
+    def _places(self, shape: tuple[int, ...], left: float, top: float, zoom: float) -> PlacedNoise:
+        """Noise for a picture (h, w) that begins at photo px `left`, `top`."""
         level = tile_level(zoom)
         tile, amount = self.noise.levels[level], self.padded
         if self.amount.shape[:2] == (1, 1):  # the same everywhere: the bands are put together
@@ -101,9 +114,10 @@ class Grain:
         ]
         pitch, (rows, columns) = zoom * self.pitch, self.amount.shape[:2]
         x, y = (self.left - left) * zoom, (self.top - top) * zoom
-        down = cell_places(0, shape[0], y, pitch, rows)
-        across = cell_places(0, shape[1], x, pitch, columns)
-        return frozen(tile), *texels, frozen(amount), *down, *across
+        above, down = cell_places(0, shape[0], y, pitch, rows)
+        before, across = cell_places(0, shape[1], x, pitch, columns)
+        ys, xs = texels
+        return PlacedNoise(frozen(tile), ys, xs, frozen(amount), above, down, before, across)
 
 
 def tile_level(zoom: float) -> int:
@@ -112,13 +126,12 @@ def tile_level(zoom: float) -> int:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _add(first, last, colour, alpha, table, tile, ys, xs, amount, rows, down, columns, across, out):
+def _add(first, last, colour, alpha, table, places, out):
     """The rows first..last of `out`: `colour` and noise."""
-    noise = np.empty((len(columns), 3), np.float32)
+    noise = np.empty((len(places.columns), 3), np.float32)
     for y in range(first, last):
-        above, below = amount[rows[y]], amount[rows[y] + 1]
-        _mix(tile[:, ys[y]], xs, above, below, down[y], columns, across, noise)
-        for x in range(len(columns)):
+        _mix(places, y, noise)
+        for x in range(len(noise)):
             a = alpha[y, x]
             brighter = np.float32(LEVELS - 1) / max(a, np.float32(1e-6))
             for c in range(3):
@@ -129,13 +142,13 @@ def _add(first, last, colour, alpha, table, tile, ys, xs, amount, rows, down, co
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _add_bytes(first, last, packed, table, tile, ys, xs, amount, rows, down, columns, across, out):
+def _add_bytes(first, last, packed, table, places, out):
     """The same of pixels of four bytes, of which the last is alpha."""
-    noise, byte, eight = np.empty((len(columns), 3), np.float32), np.uint32(255), np.uint32(8)
+    noise = np.empty((len(places.columns), 3), np.float32)
+    byte, eight = np.uint32(255), np.uint32(8)
     for y in range(first, last):
-        above, below = amount[rows[y]], amount[rows[y] + 1]
-        _mix(tile[:, ys[y]], xs, above, below, down[y], columns, across, noise)
-        for x in range(len(columns)):
+        _mix(places, y, noise)
+        for x in range(len(noise)):
             pixel = packed[y, x]
             alpha = pixel >> np.uint32(24)
             if alpha == 0:
@@ -154,9 +167,12 @@ def _add_bytes(first, last, packed, table, tile, ys, xs, amount, rows, down, col
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
-def _mix(tile, xs, above, below, share, columns, across, noise):
-    """Fills `noise` (w, 3) of one row: so much of each band of `tile` (bands, n, 3)."""
+def _mix(places, y, noise):
+    """Fills `noise` (w, 3) of row y: so much of each band of the tile."""
     noise[:] = ZERO
+    tile, xs, share = places.tile[:, places.ys[y]], places.xs, places.down[y]
+    above, below = places.amount[places.rows[y]], places.amount[places.rows[y] + 1]
+    columns, across = places.columns, places.across
     line = np.empty(len(above), np.float32)
     for b in range(len(tile)):
         for j in range(len(line)):
