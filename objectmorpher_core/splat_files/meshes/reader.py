@@ -135,8 +135,10 @@ def _check_text(data: bytes) -> None:
 def _surface(scene: Any, is_gltf: bool) -> TriangleMesh:
     """Every triangle of the scene where its node puts it."""
     parts, looks, total = [], {}, 0
-    for node in sorted(scene.graph.nodes_geometry):
-        matrix, name = scene.graph[node]
+    placed_meshes = [scene.graph[node] for node in scene.graph.nodes_geometry]
+    # Not by the nodes' names, which trimesh draws by lot where the file gives none.
+    placed_meshes.sort(key=lambda found: (found[1], found[0].tolist()))
+    for matrix, name in placed_meshes:
         mesh = scene.geometry[name]
         faces = np.asarray(getattr(mesh, "faces", ()))
         if faces.ndim != 2 or not len(faces):
