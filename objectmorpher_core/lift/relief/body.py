@@ -36,7 +36,7 @@ class ReliefBody:
     own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
     behind: Behind | None = None  # what its shape hides from the photo; None: nothing is known
     kind: str = "free"  # what it was recognised as: see `shapes`
-    lacks: F64 = field(default_factory=lambda: np.zeros(2))  # slope: see `lean`
+    lacks: F64 = field(default_factory=lambda: np.zeros(2))  # slope: see `lacking`
     doubt: float = 0.0  # x extent, expected error of the front's depth; 0: nobody said
     up: F64 | None = None  # (3,) camera axes, unit: what is up where it stands; None: not seen
 
