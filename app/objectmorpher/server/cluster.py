@@ -16,12 +16,12 @@ import secrets
 import socket
 import sys
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 from ..editor.settings import STAGES
 from .address import check_token
 from .front import IDLE, RequestLimits
-from .packing import Packing, PackingError, Site, look_at_site, packed
+from .packing import Packing, PackingError, Site, gpu_count, look_there, packed
 from .table import Table
 
 log = logging.getLogger(__name__)
@@ -32,7 +32,6 @@ UPSCALE = 1.0  # s that calls wait before another process is started: someone wa
 LOOK_BACK = 3.0  # s over which Ray Serve averages how many wait
 DOWNSCALE = 300.0  # s: a model that was loaded is soon wanted again
 HEALTH = 2.0  # s between two looks at each process
-GLIMPSE = 0.01  # of a GPU, to look at one
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ class Cluster:
             },
             logging_config={"log_level": "WARNING"},
         )
-        site, handles = _looked_up(plan), {}
+        site, handles = look_there(plan.cpus).of(plan.stages), {}
         for packing in _packings(plan, site):
             log.info("%s: %s", ", ".join(packing.stages), _told(packing))
             handles |= dict.fromkeys(packing.stages, _deployment(packing, plan, site, table))
@@ -142,34 +141,17 @@ def _deployment(packing: Packing, plan: ClusterPlan, site: Site, table: Table) -
     ).bind(table, packing.room)  # fmt: skip
 
 
-def _looked_up(plan: ClusterPlan) -> Site:
-    """What a process finds that sees what the stages' processes will see."""
-    import ray
-
-    remote: Any = ray.remote
-    look = remote(num_cpus=plan.cpus, num_gpus=GLIMPSE if _gpu_count() else 0)(look_at_site)
-    site = cast(Site, ray.get(look.remote()))
-    offers = {stage: site.offers[stage] for stage in plan.stages}
-    return Site(offers, site.card, {stage: site.takes[stage] for stage in plan.stages})
-
-
 def _packings(plan: ClusterPlan, site: Site) -> tuple[Packing, ...]:
     """Raises PackingError."""
     if plan.gpus is not None:
         return tuple(Packing((stage,), plan.gpus) for stage in plan.stages)
-    return packed(site, _gpu_count(), plan.least)
+    return packed(site, gpu_count(), plan.least)
 
 
 def _told(packing: Packing) -> str:
     if not packing.gpus:
         return "no GPU"
     return f"{packing.gpus:.2f} of a GPU each, {packing.room / 2**30:.1f} GB"
-
-
-def _gpu_count() -> float:
-    import ray
-
-    return cast(dict[str, float], ray.cluster_resources()).get("GPU", 0.0)
 
 
 def _free_port(door: Door) -> int:

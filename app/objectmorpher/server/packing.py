@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 from objectmorpher_core import models
 from objectmorpher_core.lift.workers.file import worker_names
@@ -21,6 +22,7 @@ from .offers import Offers, look_at_offers
 
 ALSO = {"depth": "lift"}  # stages of models that work in another one
 FINEST = 1000  # parts of a GPU that are told apart
+GLIMPSE = 0.01  # of a GPU, to look at one
 
 
 class PackingError(RuntimeError):
@@ -34,6 +36,13 @@ class Site:
     offers: Offers
     card: int  # bytes of its GPU; 0: there is none
     takes: Mapping[str, int]  # stage -> bytes of it that the largest of its networks takes
+
+    def of(self, stages: tuple[str, ...]) -> Site:
+        """What matters for some of the stages."""
+        return Site(
+            {stage: self.offers[stage] for stage in stages}, self.card,
+            {stage: self.takes[stage] for stage in stages},
+        )  # fmt: skip
 
 
 def look_at_site() -> Site:
@@ -63,6 +72,22 @@ def taken(stage: str, card: Card) -> int:
     return max(peaks)
 
 
+def gpu_count() -> float:
+    """GPUs of the Ray that is connected to."""
+    import ray
+
+    return cast(dict[str, float], ray.cluster_resources()).get("GPU", 0.0)
+
+
+def look_there(cpus: float = 1.0) -> Site:
+    """What a process finds on the Ray that is connected to."""
+    import ray
+
+    remote: Any = ray.remote
+    look = remote(num_cpus=cpus, num_gpus=GLIMPSE if gpu_count() else 0)(look_at_site)
+    return cast(Site, ray.get(look.remote()))
+
+
 @dataclass(frozen=True)
 class Packing:
     """Stages whose processes are the same, and what of a GPU each of these asks for."""
@@ -82,7 +107,7 @@ def packed(site: Site, count: float, copies: int) -> tuple[Packing, ...]:
     clicks = tuple(s for s in stages if s == "segment")
     told = 0.0
     for groups in (tuple((s,) for s in stages), (clicks, rest), (stages,)):
-        found = tuple(_packing(group, site) for group in groups if group)
+        found = tuple(packed_together(group, site) for group in groups if group)
         if fit([p.gpus for p in found for _ in range(copies)], count):
             return found
         told = max(p.gpus for p in found)
@@ -92,7 +117,8 @@ def packed(site: Site, count: float, copies: int) -> tuple[Packing, ...]:
     )
 
 
-def _packing(group: tuple[str, ...], site: Site) -> Packing:
+def packed_together(group: tuple[str, ...], site: Site) -> Packing:
+    """Processes of which each does the work of all these stages."""
     most = max(site.takes[stage] for stage in group)
     if not most:
         return Packing(group, 0.0)

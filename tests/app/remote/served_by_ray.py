@@ -16,25 +16,16 @@ import served_jobs
 
 from objectmorpher.server.cluster import Cluster, ClusterPlan, Door
 from objectmorpher.server.front import RequestLimits
-from objectmorpher_core import models
-from objectmorpher_core.models.hub import FileFacts, Locked, write
+from tests.research.spread.ray_apart import place_models
 
 PLACED = "sam2.1-small", "trellis-image-large"
-
-
-def place_models() -> None:
-    """Folders that look like installed models: their memory is planned by what is published."""
-    for id in PLACED:
-        (models.folder() / id).mkdir(parents=True)
-        (models.folder() / id / "config.json").write_text("{}")
-        write(id, Locked({"config.json": FileFacts(2, "")}, ""))
 
 
 def main(limits: RequestLimits) -> None:
     import ray
     from ray.cluster_utils import Cluster as Machines
 
-    place_models()
+    place_models(*PLACED)
     machine = {
         "num_cpus": 4, "num_gpus": 1, "object_store_memory": 200 << 20, "include_dashboard": False,
     }  # fmt: skip

@@ -5,7 +5,6 @@ from __future__ import annotations
 import http.client
 import io
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -16,7 +15,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +34,7 @@ from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.model_sets import DRIVER, Card, need_of
 from objectmorpher_core.models import hub_model
 from objectmorpher_core.models.ledger import SPARE, Ledger, Model
-from tests.research.spread.ray_apart import environment, own_folder
+from tests.research.spread.ray_apart import claim_gpu, environment, own_folder
 from tests.tree import over
 
 TOKEN = "a-token-that-is-long-enough"
@@ -67,7 +65,7 @@ class Listening:
         ]),
     ],
 )  # fmt: skip
-def front(request: pytest.FixtureRequest, tmp_path_factory: Any) -> Iterator[Listening]:
+def front(request: pytest.FixtureRequest) -> Iterator[Listening]:
     if request.param == "this process":
         own = Front(("127.0.0.1", 0), TOKEN, Alone(), served_jobs.TABLE, RequestLimits(**LIMITS))
         own.start()
@@ -75,13 +73,7 @@ def front(request: pytest.FixtureRequest, tmp_path_factory: Any) -> Iterator[Lis
         own.close()
         return
     with own_folder() as folder:
-        program = folder / "nvidia-smi"
-        program.write_text(f"#!/bin/sh\necho {CARD >> 20}\n")
-        program.chmod(0o755)
-        own = environment(
-            folder, OBJECTMORPHER_CACHE=str(tmp_path_factory.mktemp("cache")),
-            PATH=f"{folder}{os.pathsep}{os.environ['PATH']}",
-        )  # fmt: skip
+        own = environment(folder, **claim_gpu(folder, CARD))
         with subprocess.Popen(
             [sys.executable, str(Path(__file__).with_name("served_by_ray.py")),
              json.dumps(LIMITS), TOKEN],
