@@ -35,10 +35,7 @@ def own_folder() -> Iterator[Path]:
 
 def environment(folder: Path, **more: str) -> dict[str, str]:
     """This process's, without what names another Ray."""
-    own = {
-        "RAY_TMPDIR": str(folder), "RAY_USAGE_STATS_ENABLED": "0",
-        "RAY_raylet_start_wait_time_s": "120",  # of a busy machine
-    }  # fmt: skip
+    own = {"RAY_TMPDIR": str(folder), "RAY_USAGE_STATS_ENABLED": "0"}
     foreign = ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_ADDRESS")
     return {k: v for k, v in os.environ.items() if k not in foreign} | own | more
 

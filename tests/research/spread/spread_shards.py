@@ -30,7 +30,7 @@ def main(source: Path, out: Path, notes: Path, *installed: str) -> None:
     from ray.cluster_utils import Cluster
 
     place_models(*installed)
-    small = {"num_cpus": 2, "num_gpus": bool(installed), "object_store_memory": 100 << 20}
+    small = {"num_cpus": 2, "num_gpus": int(bool(installed)), "object_store_memory": 100 << 20}
     cluster = Cluster(initialize_head=True, head_node_args=small | {"include_dashboard": False})
     cluster.add_node(**small)
     cluster.wait_for_nodes()

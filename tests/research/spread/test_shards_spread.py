@@ -51,7 +51,8 @@ def test_a_killed_worker_loses_nothing_and_each_shard_is_there_once(
     )  # fmt: skip
     # Two processes do not fit on such a GPU: each has one to itself, and keeps it.
     assert told["gpus"] == (["0"] if installed else [""])
-    assert len(told["killed"]) == 1 and told["nodes"] == 2 and told["workers"] >= 3
+    least = 2 if installed else 3  # one more beside the killed one: a GPU has place for one
+    assert len(told["killed"]) == 1 and told["nodes"] == 2 and told["workers"] >= least
     assert told["asked"] > PAIRS  # what the killed one had begun was begun anew
     assert told["unfinished"] >= 1  # and what it left behind is no shard
     assert sorted(p.name for p in out.glob("*shard-*")) == told["shards"]
