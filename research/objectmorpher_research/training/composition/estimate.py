@@ -33,7 +33,7 @@ NF4 = 0.5 + 0.127 / 8  # bytes of a weight: four bits, and 0.127 bits of scales 
 
 
 @dataclass(frozen=True)
-class Estimate:
+class TrainingMemory:
     """Bytes on each GPU."""
 
     weights: int  # of the frozen network
@@ -62,15 +62,15 @@ class _Network:
     step: int  # bytes that a step has at most besides
 
 
-def table(plan: LoraPlan, size: dict[str, Any] | None = None) -> dict[str, Estimate]:
+def table(plan: LoraPlan, size: dict[str, Any] | None = None) -> dict[str, TrainingMemory]:
     """The ways in which a plan can be trained; `size`: of another network than the published."""
     found = _looked_at(plan, edit_models.load(plan.model).size if size is None else size)
     adam = 4 * found.learned * (5 if plan.mean else 4)
-    whole = Estimate(found.weights, adam, found.step)
+    whole = TrainingMemory(found.weights, adam, found.step)
     ways = {plan.number: whole}
     for count in SHARDED:
         gathered = 2 * found.largest_block  # one is in use, the next on its way
-        ways[f"{plan.number}, sharded over {count} GPUs"] = Estimate(
+        ways[f"{plan.number}, sharded over {count} GPUs"] = TrainingMemory(
             found.weights // count, adam // count, found.step + gathered
         )
     ways["nf4"] = replace(
@@ -79,7 +79,7 @@ def table(plan: LoraPlan, size: dict[str, Any] | None = None) -> dict[str, Estim
     return ways
 
 
-def told(plan: LoraPlan, ways: dict[str, Estimate]) -> str:
+def told(plan: LoraPlan, ways: dict[str, TrainingMemory]) -> str:
     """Return lines for the terminal."""
     lines = [f"{plan.model}, {plan.side} x {plan.side} px, rank {plan.rank}: GB on each GPU, about"]
     for name, way in ways.items():
@@ -168,7 +168,7 @@ def _blocks(network: Any) -> list[Any]:
     return [module for module in network.modules() if type(module).__name__ in kinds]
 
 
-class Count:
+class LiveBytes:
     """Bytes of the tensors that are alive."""
 
     def __init__(self) -> None:
@@ -192,13 +192,13 @@ class Count:
 
 
 @contextmanager
-def counting() -> Iterator[Count]:
+def counting() -> Iterator[LiveBytes]:
     """Counts what is made meanwhile."""
     import torch
     from torch.utils._python_dispatch import TorchDispatchMode
     from torch.utils._pytree import tree_map_only
 
-    found = Count()
+    found = LiveBytes()
 
     class Counting(TorchDispatchMode):
         def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None):
