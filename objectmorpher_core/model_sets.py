@@ -18,7 +18,7 @@ from .compose.plate import inpaint_pixelhacker
 from .compose.refine import klein, qwen
 from .compose.refine.diffusion import DiffusionRefiner
 from .lift.trellis import lifter
-from .models import HubModel, ModelError, ModelSet, device
+from .models import HubModel, ModelError, ModelSet, depth_net, device
 from .models.device import Device
 from .models.fetch import SLACK
 from .models.ledger import Ledger, Model
@@ -172,6 +172,8 @@ def need_of(model: HubModel) -> Needs | None:
         return Need(numbers, sam_torch.WORK[model.family])
     if model.family in ("trellis", "cupid"):
         return lifter.need()
+    if model.family == "depth-anything":
+        return Need(numbers, depth_net.WORK, numbers=("float32",))
     if model.family == "pixelhacker":
         return inpaint_pixelhacker.need(numbers)
     if model.family not in PIPELINES:

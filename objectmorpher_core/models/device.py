@@ -17,6 +17,7 @@ Number = Literal["float32", "float16", "bfloat16"]
 
 DEVICE = "OBJECTMORPHER_DEVICE"  # environment variable: cuda, mps or cpu
 NAMES = {"cuda": "the GPU", "mps": "the GPU (MPS)", "cpu": "the CPU"}
+_room = 0  # bytes of the GPU that this process keeps to; 0: all
 
 
 def has_torch() -> bool:
@@ -64,9 +65,16 @@ def free_memory(device: Device) -> int | None:
     import torch
 
     if device == "cuda":
-        idle = torch.cuda.memory_reserved() - torch.cuda.memory_allocated()
-        return int(torch.cuda.mem_get_info()[0]) + idle
+        taken = torch.cuda.memory_allocated()
+        free = int(torch.cuda.mem_get_info()[0]) + torch.cuda.memory_reserved() - taken
+        return min(free, max(0, _room - taken)) if _room else free
     return int(torch.mps.recommended_max_memory() - torch.mps.current_allocated_memory())
+
+
+def keep_to(room: int) -> None:
+    """This process takes `room` bytes of its GPU at most, whatever is free there; 0: all."""
+    global _room
+    _room = room
 
 
 def is_out_of_memory(error: BaseException) -> bool:

@@ -88,6 +88,7 @@ def _entries(
             known = _known(task, options.overwrite)
             yield number, _told(task) | (known or _outcome(task.item))
         return
+    from ..editor.settings import STAGES
     from ..server.spread import spread
 
     jobs = []
@@ -97,7 +98,7 @@ def _entries(
         elif task.item is not None:
             text = script_text(beside(task.item, Path.cwd()))  # with whole paths
             jobs.append({"number": number, "edit": text})
-    for answer in spread(_made_there, jobs, options.ray):
+    for answer in spread(_made_there, jobs, options.ray, STAGES):
         number = answer["number"]
         yield number, _told(tasks[number]) | answer["outcome"]
 

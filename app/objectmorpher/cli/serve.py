@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from .terminal import UsageError
 
 if TYPE_CHECKING:
+    from ..server.cluster import Cluster
     from ..server.front import HttpServer
 
 
@@ -43,17 +44,17 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
     add("--ray", metavar="ADDRESS", help="of a running Ray cluster; default: start one here")
     add("--stages", metavar="A,B", help="of segment, lift, inpaint and refine; default all of them")
     add("--replicas", metavar="MIN[,MAX]", default="1",
-        help="processes per backend, growing with the queue; default 1")  # fmt: skip
+        help="processes per stage, growing with the queue; default 1")  # fmt: skip
     add("--cpus", type=float, default=1.0, metavar="N", help="per process, default 1")
     add("--gpus", type=float, metavar="N",
-        help="per process; default: all backends share one, if there is one")  # fmt: skip
+        help="per process; default: by the memory that its networks take")  # fmt: skip
     add("--store", type=int, metavar="MB", help="memory for Ray's objects; default Ray's own")
 
 
 def run_serve(options: argparse.Namespace) -> None:
     """Serves until it is interrupted or ended."""
     from ..editor.settings import STAGES
-    from ..server.cluster import Cluster, ClusterPlan
+    from ..server.cluster import Cluster, ClusterPlan, Door
     from ..server.front import Front, RequestLimits
     from ..server.running import Alone
     from ..server.table import table
@@ -78,15 +79,16 @@ def run_serve(options: argparse.Namespace) -> None:
     store = None if options.store is None else options.store << 20
     plan = ClusterPlan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
     show_log()
-    served = {name: row for name, row in table().items() if row.stage in stages}
-    runner = Alone(stages) if options.alone else Cluster(plan)
-    try:
-        limits = RequestLimits(body=options.max_body << 20)
-        front = Front((options.host, options.port), token, runner, served, limits)
-        with _served(front):  # Ray sets handlers of signals when it starts, and has done so
-            _greet(front.url, token if is_new else None, options)
-    finally:
-        runner.close()
+    limits = RequestLimits(body=options.max_body << 20)
+    if options.alone:
+        served = {name: row for name, row in table().items() if row.stage in stages}
+        address = options.host, options.port
+        front = Front(address, token, Alone(stages), served, limits)
+        front.start()
+    else:
+        front = Cluster(plan, Door(options.host, options.port, token, limits), table())
+    with _served(front):  # Ray sets handlers of signals when it starts, and has done so
+        _greet(front.url, token if is_new else None, options)
 
 
 OF_CLUSTERS = ("ray", "stages", "gpus", "store")
@@ -104,6 +106,7 @@ def _run_web(options: argparse.Namespace) -> None:
     token, is_new = _token(options.token_file)
     show_log()
     server = WebServer((options.host, options.port), token, options.max_body << 20)
+    server.start()
     with _served(server):
         _greet(server.url, token if is_new else None, options)
         sys.stdout.write(
@@ -118,15 +121,14 @@ def _check_address(options: argparse.Namespace) -> None:
 
 
 @contextmanager
-def _served(server: HttpServer) -> Iterator[None]:
-    """Serve after the body has run, until the process is asked to end."""
+def _served(server: HttpServer | Cluster) -> Iterator[None]:
+    """Serve until the process is asked to end, once the body has run; then close."""
     stop = threading.Event()
 
     def end(number: int, frame: FrameType | None) -> None:
         stop.set()
 
     signal.signal(signal.SIGTERM, end)
-    server.start()
     try:
         yield
         stop.wait()

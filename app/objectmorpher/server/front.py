@@ -11,6 +11,7 @@ one is gone: then the job is stopped, or done elsewhere. Closing the connection 
 
 from __future__ import annotations
 
+import hmac
 import json
 import logging
 import queue
@@ -19,6 +20,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from email.message import Message
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -32,7 +34,7 @@ from objectmorpher_core.base.limits import WAITING_JOBS as MOST_JOBS
 from objectmorpher_core.base.progress import Cancelled
 
 from .. import __version__
-from .address import PROTOCOL, check_token, is_same
+from .address import PROTOCOL, check_token, fingerprint
 from .message import MessageError, MissingError, decode, digest
 from .offers import told_offers
 from .running import Call, JobOutcome, Runner
@@ -130,6 +132,25 @@ class Refusal(Exception):
         self.status, self.answer = status, {"error": sentence, **more}
 
 
+def check_bearer(said: str, expected: bytes) -> None:
+    """Raises Refusal where an Authorization header does not bring the token of a fingerprint."""
+    scheme, _, brought = said.partition(" ")
+    # Latin-1 is how http.server reads headers; what is not ASCII cannot be a token.
+    if scheme != "Bearer" or not hmac.compare_digest(fingerprint(brought.strip()), expected):
+        raise Refusal(HTTPStatus.UNAUTHORIZED, "the token is missing or wrong")
+
+
+def announced(headers: Mapping[str, str] | Message, most: int) -> int:
+    """The bytes of a body whose length must be said first, at most `most`. Raises Refusal."""
+    told = headers.get("Content-Length") or ""
+    if "Transfer-Encoding" in headers or not (told.isascii() and told.isdigit()):
+        raise Refusal(HTTPStatus.LENGTH_REQUIRED, "how many bytes come must be said first")
+    if len(told) > MOST_DIGITS or int(told) > most:
+        limit = f"{most >> 20} MB" if most >= 1 << 20 else f"{most >> 10} kB"
+        raise Refusal(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"more than {limit} are not taken")
+    return int(told)
+
+
 class Handler(BaseHTTPRequestHandler):
     """The handler of one request. Subclasses have `admit`, and `get` or `post` or both."""
 
@@ -162,10 +183,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def admit_with(self, token: str) -> None:
         """Raises Refusal for whoever does not bring the token along."""
-        scheme, _, brought = self.headers.get("Authorization", "").partition(" ")
-        # Latin-1 is how http.server reads headers; what is not ASCII cannot be a token.
-        if scheme != "Bearer" or not is_same(brought.strip(), token):
-            raise Refusal(HTTPStatus.UNAUTHORIZED, "the token is missing or wrong")
+        check_bearer(self.headers.get("Authorization", ""), fingerprint(token))
 
     def answer(self, work: Callable[[], None]) -> None:
         """Does `work`, which sends the answer or raises Refusal, for whoever is admitted."""
@@ -179,13 +197,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def read_body(self, most: int) -> bytes:
         """Read as many bytes as were announced, at most `most`. Raises Refusal."""
-        told = self.headers.get("Content-Length", "")
-        if "Transfer-Encoding" in self.headers or not (told.isascii() and told.isdigit()):
-            raise Refusal(HTTPStatus.LENGTH_REQUIRED, "how many bytes come must be said first")
-        if len(told) > MOST_DIGITS or int(told) > most:
-            limit = f"{most >> 20} MB" if most >= 1 << 20 else f"{most >> 10} kB"
-            raise Refusal(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"more than {limit} are not taken")
-        pieces, left = [], int(told)
+        pieces, left = [], announced(self.headers, most)
         while left:  # what comes is kept, not what was announced
             piece = self.rfile.read(min(PIECE, left))
             if not piece:
@@ -208,10 +220,14 @@ class Handler(BaseHTTPRequestHandler):
     def send_head(self, status: HTTPStatus, kind: str, headers: Mapping[str, str]) -> None:
         """Status line and headers; without a length what follows ends with the connection."""
         self.send_response(status)
-        common = {"Content-Type": kind, "X-Content-Type-Options": "nosniff", "Connection": "close"}
-        for name, value in (common | dict(self.more_headers) | dict(headers)).items():
+        for name, value in self.head(kind, headers).items():
             self.send_header(name, value)
         self.end_headers()
+
+    def head(self, kind: str, headers: Mapping[str, str]) -> dict[str, str]:
+        """All headers of an answer of the media type `kind`."""
+        common = {"Content-Type": kind, "X-Content-Type-Options": "nosniff", "Connection": "close"}
+        return common | dict(self.more_headers) | dict(headers)
 
 
 log = logging.getLogger(__name__)
@@ -229,27 +245,41 @@ class RequestLimits:
     jobs: int = MOST_JOBS
 
 
+class Service:
+    """A table of job functions, and what is kept between requests for them."""
+
+    def __init__(
+        self, token: str, runner: Runner, table: Table, limits: RequestLimits = RequestLimits()
+    ) -> None:
+        """Raises TokenError."""
+        self.token, self.runner, self.table, self.limits = (
+            check_token(token), runner, table, limits,
+        )  # fmt: skip
+        self.blobs: Kept[bytes] = Kept(limits.blobs, len)  # by their SHA-256
+        self.places = threading.BoundedSemaphore(limits.jobs)
+        self.is_closing = threading.Event()
+
+
 class Front(HttpServer):
-    """Serves a table of job functions to whoever has the token."""
+    """Serves a table of job functions from this process to whoever has the token."""
 
     def __init__(
         self, address: tuple[str, int], token: str, runner: Runner, table: Table,
         limits: RequestLimits = RequestLimits(),
     ) -> None:  # fmt: skip
         """Raises OSError where the address is taken, TokenError."""
-        self.token, self.runner, self.table, self.limits = (
-            check_token(token), runner, table, limits,
-        )  # fmt: skip
-        self.blobs: Kept[bytes] = Kept(limits.blobs, len)  # by their SHA-256
-        self.places = threading.BoundedSemaphore(limits.jobs)
-        super().__init__(address, partial(_Handler, self), limits.connections)
+        service = Service(token, runner, table, limits)
+        super().__init__(address, partial(ServiceHandler, service), limits.connections)
+        self.is_closing = service.is_closing
 
 
-class _Handler(Handler):
+class ServiceHandler(Handler):
+    """Answers one request to a service."""
+
     more_headers: ClassVar = {"X-Accel-Buffering": "no"}  # nginx hands each line on at once
 
-    def __init__(self, front: Front, *connection: Any) -> None:
-        self.front = front
+    def __init__(self, service: Service, *connection: Any) -> None:
+        self.service = service
         super().__init__(*connection)
 
     def do_PUT(self) -> None:
@@ -257,53 +287,53 @@ class _Handler(Handler):
 
     def admit(self) -> None:
         """Refuses whoever has not the token."""
-        self.admit_with(self.front.token)
+        self.admit_with(self.service.token)
 
     def get(self) -> None:
         if self.path != "/v1/hello":
             raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
         self.send_json(HTTPStatus.OK, {
             "product": "objectmorpher", "version": __version__, "protocol": PROTOCOL,
-            "stages": self.front.runner.stages(), "functions": sorted(self.front.table),
-            "backends": told_offers(self.front.runner.offers()),
+            "stages": self.service.runner.stages(), "functions": sorted(self.service.table),
+            "backends": told_offers(self.service.runner.offers()),
         })  # fmt: skip
 
     def _put(self) -> None:
         _, folder, name = ("", *self.path.removeprefix("/v1/").split("/"), "")[:3]
         if folder != "blobs" or len(name) != 64:
             raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
-        body = self.read_body(self.front.limits.body)
+        body = self.read_body(self.service.limits.body)
         if digest(body) != name:
             raise Refusal(HTTPStatus.BAD_REQUEST, "the bytes are not those of that name")
-        self.front.blobs.add(name, body)
+        self.service.blobs.add(name, body)
         self.send_json(HTTPStatus.CREATED, {})
 
     def post(self) -> None:
         name = self.path.removeprefix("/v1/jobs/")
-        served = self.front.table.get(name)
+        served = self.service.table.get(name)
         if served is None:
             raise Refusal(HTTPStatus.NOT_FOUND, "there is no such function")
-        body = self.read_body(self.front.limits.body)
+        body = self.read_body(self.service.limits.body)
         try:
             blobs = self._blobs(body)
-            backend = served.backend(served.checked(decode(body, types(), blobs)))
+            at_hand = served.at_hand(served.checked(decode(body, types(), blobs)), blobs)
         except MissingError as error:
             raise Refusal(HTTPStatus.CONFLICT, str(error), missing=error.digests) from error
         except MessageError as error:
             raise Refusal(HTTPStatus.BAD_REQUEST, str(error)) from error
-        if not self.front.places.acquire(blocking=False):
+        if not self.service.places.acquire(blocking=False):
             raise Refusal(HTTPStatus.SERVICE_UNAVAILABLE, "too many jobs wait already")
         try:
-            _Conversation(self, Call(name, body, blobs, backend)).hold()
+            _Conversation(self, Call(name, body, blobs, at_hand)).hold()
         finally:
-            self.front.places.release()
+            self.service.places.release()
 
     def _blobs(self, body: bytes) -> dict[str, bytes]:
         """The large arrays that a message names; raises MissingError."""
         try:
             decode(body, types())
         except MissingError as error:
-            found = self.front.blobs.found(error.digests)
+            found = self.service.blobs.found(error.digests)
             lacking = tuple(name for name in error.digests if name not in found)
             if lacking:
                 raise MissingError(lacking) from error
@@ -314,7 +344,7 @@ class _Handler(Handler):
 class _Conversation:
     """One job: its progress told line by line, its answer, and its end with the connection's."""
 
-    def __init__(self, handler: _Handler, call: Call) -> None:
+    def __init__(self, handler: ServiceHandler, call: Call) -> None:
         self._handler, self._call = handler, call
         self._stop = threading.Event()
         self._said: queue.SimpleQueue[tuple[float, str]] = queue.SimpleQueue()
@@ -332,7 +362,7 @@ class _Conversation:
             while not self._done.wait(BEAT):
                 state = self._newest(state)
                 self._line(state)
-                if self._handler.front.is_closing.is_set():
+                if self._handler.service.is_closing.is_set():
                     return
             self._finish()
         except OSError:
@@ -362,11 +392,11 @@ class _Conversation:
         self._handler.wfile.write(json.dumps(value).encode() + b"\n")
 
     def _run(self) -> None:
-        front = self._handler.front
-        served = front.table[self._call.name]
+        service = self._handler.service
+        served = service.table[self._call.name]
         try:
             tell = self._tell
-            self._outcome = front.runner.run(self._call, served, tell, self._stop)
+            self._outcome = service.runner.run(self._call, served, tell, self._stop)
         except Cancelled:
             pass
         except Exception as error:

@@ -146,6 +146,15 @@ def decode(body: bytes, types: Types, blobs: Mapping[str, bytes] | None = None) 
     return value(tree)
 
 
+def name_of(array: np.ndarray, blobs: Mapping[str, bytes]) -> str:
+    """The name of an array of a decoded message: its own message's, or made of its bytes."""
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        owner = owner.base
+    named = next((name for name, body in blobs.items() if body is owner), None)
+    return named or digest(array.tobytes())
+
+
 def _named(part: Any, depth: int) -> set[str]:
     """The large arrays that a tree names; refuses one that is too deep or has bare lists."""
     if depth > MOST_DEPTH:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..editor.settings import AUTO, STAGES, by_stage
+from ..editor.settings import STAGES, by_stage
 
 MOST_NAMES = 64  # of a stage's backends that a server may name
 MOST_LETTERS = 48
@@ -17,16 +17,6 @@ class Offer:
 
     auto: str  # the backend that "auto" is; empty: none can run
     able: tuple[str, ...]
-
-    def deployed(self, backend: str) -> str:
-        """Whose processes do what `backend` is asked to do: a model's own id is its family's."""
-        from objectmorpher_core.models import hub_models
-
-        families = {model.id: model.family for model in hub_models()}
-        for name in (backend, families.get(backend, "")):
-            if name in self.able:
-                return name
-        return self.auto or AUTO  # which says why it cannot be done
 
 
 Offers = dict[str, Offer]  # by stage

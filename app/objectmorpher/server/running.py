@@ -58,7 +58,7 @@ class Call:
     name: str  # of the table
     body: bytes
     blobs: Mapping[str, bytes]
-    backend: str = AUTO  # which is asked
+    at_hand: str = AUTO  # what the process should have that runs it, see `Served.at_hand`
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Runner(Protocol):
     """Runs one call after the other, or several at a time."""
 
     def stages(self) -> dict[str, int]:
-        """Stage -> how many calls of it, for one backend, may run at a time."""
+        """Stage -> how many calls of it may run at a time."""
         ...
 
     def offers(self) -> Offers:

@@ -1,5 +1,8 @@
 """Work on many machines by Ray Data: each worker takes a job after the other.
 
+Where the jobs use networks and there are GPUs, the workers are actors, of which as many lie on a
+GPU as their largest network leaves room for; what it has loaded stays for the next job.
+
 A job is JSON, and so is its answer. A worker that is lost has answered nothing, and Ray gives its
 job to another one: a job leaves its results whole or not at all, and one that is done again does
 no harm. Every machine has this program, and sees all files under the same names.
@@ -12,7 +15,10 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from objectmorpher_core.models import device
+
 from ..cli.terminal import FAILURES, failure_sentence
+from .packing import Packing, gpu_count, look_there, packed_together
 
 HERE = "local"  # instead of an address: a Ray is started on this machine
 
@@ -24,10 +30,12 @@ class SpreadError(RuntimeError):
     """The cluster is not there or gave up, or a job failed; one sentence."""
 
 
-def spread(perform: Perform, jobs: Sequence[Job], address: str) -> Iterator[dict[str, Any]]:
+def spread(
+    perform: Perform, jobs: Sequence[Job], address: str, stages: tuple[str, ...] = ()
+) -> Iterator[dict[str, Any]]:
     """The answers of `perform` on the cluster at `address`, as they come; "local" starts a Ray.
 
-    Raises SpreadError.
+    `stages`: whose networks the jobs use. Raises SpreadError.
     """
     if not jobs:
         return
@@ -41,7 +49,7 @@ def spread(perform: Perform, jobs: Sequence[Job], address: str) -> Iterator[dict
         except (ConnectionError, OSError, RuntimeError, ValueError) as error:
             raise SpreadError(f"there is no Ray at {address}: {_line(error)}") from error
     try:
-        for row in _rows(perform, jobs):
+        for row in _rows(perform, jobs, stages):
             told = json.loads(row["told"])
             if "failed" in told:
                 raise SpreadError(told["failed"])
@@ -53,7 +61,9 @@ def spread(perform: Perform, jobs: Sequence[Job], address: str) -> Iterator[dict
             ray.shutdown()
 
 
-def _rows(perform: Perform, jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
+def _rows(
+    perform: Perform, jobs: Sequence[Job], stages: tuple[str, ...]
+) -> Iterator[dict[str, Any]]:
     import ray.data
 
     context = ray.data.DataContext.get_current()
@@ -62,8 +72,30 @@ def _rows(perform: Perform, jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
     rows = [{"job": json.dumps(job)} for job in jobs]
     # A block a job: what is lost with a worker is one job, and one is asked for at a time.
     found = ray.data.from_items(rows, override_num_blocks=len(rows))
-    answered: Any = _answered  # Ray's types know no `fn_args`
-    return iter(found.map(answered, fn_args=(perform,), num_cpus=1).iter_rows())
+    count = int(gpu_count()) if stages else 0
+    packing = packed_together(stages, look_there()) if count else Packing((), 0.0)
+    worker: Any = _answered  # Ray's types know no arguments of it
+    how: dict[str, Any] = {"fn_args": (perform,)}
+    if packing.gpus:
+        most = min(len(rows), count * int(1 / packing.gpus))
+        pool = ray.data.ActorPoolStrategy(
+            min_size=1, max_size=most, max_tasks_in_flight_per_actor=1
+        )
+        worker = _Worker
+        how = {"fn_constructor_args": (perform, packing.room), "compute": pool,
+               "num_gpus": packing.gpus}  # fmt: skip
+    return iter(found.map(worker, num_cpus=1, **how).iter_rows())
+
+
+class _Worker:
+    """An actor that has a part of a GPU."""
+
+    def __init__(self, perform: Perform, room: int) -> None:
+        self._perform = perform
+        device.keep_to(room)
+
+    def __call__(self, row: dict[str, Any]) -> dict[str, Any]:
+        return _answered(row, self._perform)
 
 
 def _answered(row: dict[str, Any], perform: Perform) -> dict[str, Any]:

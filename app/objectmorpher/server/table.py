@@ -24,7 +24,7 @@ from ..editor.settings import AUTO
 from ..worker import job_functions
 from ..worker.job_functions import BackendChoice, Cut, Cutout, Variant
 from .fitting import fits, is_photo
-from .message import MessageError
+from .message import MessageError, name_of
 
 MOST_VARIANTS = 12
 
@@ -39,8 +39,13 @@ class Served:
     gives: Any  # type of its answer
     check: Callable[..., None] = lambda *arguments: None  # raises MessageError
 
-    def backend(self, arguments: tuple[Any, ...]) -> str:
-        """Which backend of the stage is asked, of arguments that were checked."""
+    def at_hand(self, arguments: tuple[Any, ...], blobs: Mapping[str, bytes]) -> str:
+        """What a process answers sooner that has it from before, of arguments that were checked.
+
+        For a click that is the photo, which it has read; else the backend, which it has loaded.
+        """
+        if self.stage == "segment":
+            return name_of(arguments[0], blobs)
         chosen = [a.backend for a in arguments if isinstance(a, BackendChoice | RefineOptions)]
         named = [a for a in arguments if isinstance(a, str)]  # where nothing but the name is chosen
         return next(iter((*chosen, *named)), AUTO)

@@ -55,6 +55,7 @@ def show_log() -> None:
     terminal = logging.StreamHandler()
     terminal.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
     logging.getLogger().addHandler(terminal)
+    logging.getLogger().setLevel(logging.INFO)
 
 
 class _QuietFile(RotatingFileHandler):

@@ -71,7 +71,7 @@ class Cut:
 
 
 class PhotoMemory:
-    """The worker's memory: its segmenter, and what it has made of the last photo."""
+    """A segmenter, and what it has made of the last photo."""
 
     def __init__(self) -> None:
         self._backend = ""
@@ -96,7 +96,13 @@ class PhotoMemory:
         return self._reading
 
 
-_memory = PhotoMemory()
+_memory = PhotoMemory()  # this process's
+
+
+def remember(memory: PhotoMemory) -> None:
+    """The next jobs go on with another memory, where one process is to remember several photos."""
+    global _memory
+    _memory = memory
 
 
 def _is_same(a: Pixels, b: Pixels) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -99,6 +100,8 @@ def _add_lora(parser: argparse.ArgumentParser) -> None:
     add("--sample-steps", type=int, default=20, metavar="N", help="of their pictures; 0: none")
     add("--number", default="auto", metavar="T",
         help="bfloat16 or float32; auto: bfloat16 on a GPU")  # fmt: skip
+    add("--base", default="whole", metavar="B",
+        help="the frozen network: whole, or nf4, in four bits (QLoRA)")  # fmt: skip
     add("--seed", type=int, default=0, metavar="N", help="of order, noise and the adapter")
     add("--dry-run", action="store_true",
         help="measure steps at the published size with random weights, no DATA")  # fmt: skip
@@ -150,10 +153,11 @@ def _train_lora(options: argparse.Namespace) -> None:
     plan = LoraPlan(
         options.model, options.size, options.rank, options.rate, options.ratio,
         batch=options.batch, warm_up=options.warm_up, mean=options.ema, held_out=options.held_out,
-        number=_number(options.number), seed=options.seed,
+        number=_number(options.number), seed=options.seed, base=options.base,
     )  # fmt: skip
     plan.check()
     if options.dry_run:
+        _say_estimate(plan)
         _measure(plan, max(min(options.steps, MEASURED), 1))
         return
     if options.triplets is None or options.out is None:
@@ -166,6 +170,7 @@ def _train_lora(options: argparse.Namespace) -> None:
     weights = edit_models.folder_of(model, options.weights)
     cache = options.cache or options.triplets / "latents"
     options.out.mkdir(parents=True, exist_ok=True)
+    _say_estimate(plan)
     places = TrainingFolders(options.triplets, options.out, weights, cache)
     course = Course(options.steps, options.save_every, options.look_every, options.sample_steps)
     with progress_bar("Training") as progress:
@@ -184,6 +189,14 @@ def _number(name: str) -> str:
         raise UsageError(f"--number is one of {', '.join(NUMBERS)}, not {name!r}")
     has_gpu = "cuda" in device.devices()
     return ("bfloat16" if has_gpu else "float32") if name == "auto" else name
+
+
+def _say_estimate(plan: Any) -> None:
+    """By the first process of those that `accelerate launch` or torchrun has started."""
+    from ..training.composition import estimate
+
+    if os.environ.get("RANK", "0") == "0":
+        print(estimate.told(plan, estimate.table(plan)), flush=True)
 
 
 def _measure(plan: Any, count: int) -> None:

@@ -37,6 +37,11 @@ def break_down(progress: Progress) -> None:
     raise ArithmeticError("out of memory on the device")
 
 
+def look(progress: Progress) -> tuple[str, ...]:
+    """What was done in this process."""
+    return tuple(seen)
+
+
 def need_positive(number: int) -> None:
     if number < 0:
         raise MessageError(f"{number} steps")
@@ -49,5 +54,6 @@ TABLE = {
         Served(count, "lift", (int,), int, need_positive),
         Served(refuse, "lift", (), None),
         Served(break_down, "lift", (), None),
+        Served(look, "lift", (), tuple[str, ...]),
     )
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import os
 import re
 import shutil
@@ -24,14 +25,14 @@ from same_values import same_values
 
 from objectmorpher.server.address import Address, NotServed, ServedError, Server
 from objectmorpher.server.client import call, hello
-from objectmorpher.server.offers import read_offers
 from objectmorpher.worker import job_functions
 from objectmorpher.worker.job_functions import BackendChoice, Cut
-from objectmorpher_core import compose
 from objectmorpher_core.base.arrays import frozen
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.compose.refine.refinement import CoarseEdit
 from objectmorpher_core.document.model import Click, LiftSettings, Prompt
+from objectmorpher_core.scripting.runner import RefineOptions
 
 pytestmark = [
     pytest.mark.slow,
@@ -41,7 +42,7 @@ pytestmark = [
 TOKEN = "a-token-that-is-long-enough"
 ROOT = Path(__file__).parents[3]
 OPTIONS = (
-    "--port", "0", "--stages", "lift,inpaint",
+    "--port", "0", "--stages", "segment,lift,inpaint",
     "--replicas", "2", "--cpus", "0.25", "--store", "100",
 )  # fmt: skip
 SAMPLE = ROOT / "assets" / "samples" / "coffee.jpg"
@@ -131,7 +132,7 @@ def mask(photo: np.ndarray) -> np.ndarray:
 
 
 def test_it_tells_its_stages(server: Server) -> None:
-    assert hello(server)["stages"] == {"lift": 2, "inpaint": 2}
+    assert hello(server)["stages"] == {"segment": 2, "lift": 2, "inpaint": 2}
 
 
 def test_a_lift_is_what_it_is_here_to_the_last_bit(
@@ -183,21 +184,37 @@ def test_two_processes_work_at_a_time_and_a_third_job_waits(
     assert len(set(serving.pids[-3:])) == 2
 
 
-def test_a_backend_has_processes_of_its_own_which_start_with_its_first_job(
-    serving: Serving, photo: np.ndarray, mask: np.ndarray
+def test_clicks_reach_the_process_that_has_read_the_photo(
+    serving: Serving, photo: np.ndarray
 ) -> None:
-    offers = read_offers(hello(serving.server)["backends"])
-    assert list(offers) == ["lift", "inpaint"] and "telea" in offers["inpaint"].able
-    assert offers["inpaint"].auto == compose.load().name
-    deployed = r" ([a-z0-9.-]+) is deployed"
-    before = re.findall(deployed, serving.log.read_text())
-    assert before == [f"{stage}-{offers[stage].auto}" for stage in ("lift", "inpaint")]
-    for name in ("auto", "telea", "telea"):
-        answer = call(serving.server, "inpaint", (photo, mask, BackendChoice(name)), silent)
-        assert answer.backend == (name if name != "auto" else offers["inpaint"].auto)
-    of_auto, first, second = serving.pids[-3:]
-    assert of_auto not in (first, second)
-    assert re.findall(deployed, serving.log.read_text()) == [*before, "inpaint-telea"]
+    photos = [frozen(np.roll(photo, 37 * k, 1)) for k in range(4)]
+
+    def click(number: int, x: float) -> int:
+        """The process that answers."""
+        asked = photos[number], Prompt((Click(x, 150.0),)), BackendChoice("grabcut")
+        before = len(serving.pids)
+        assert call(serving.server, "segment", asked, silent).mask.any()
+        end = time.monotonic() + 10
+        while len(serving.pids) == before:  # the line is on its way from the process's machine
+            assert time.monotonic() < end
+            time.sleep(0.02)
+        return serving.pids[-1]
+
+    read = [click(k, 225.0) for k in range(4)]
+    for x in (230.0, 220.0, 240.0):
+        assert [click(k, x) for k in (2, 0, 3, 1)] == [read[k] for k in (2, 0, 3, 1)]
+
+
+def test_whoever_lacks_the_token_is_told_nothing_by_the_proxies_either(serving: Serving) -> None:
+    address = serving.server.address
+    for path in ("/v1/hello", "/", "/-/routes", "/-/healthz"):
+        for headers in ({}, {"Authorization": f"Bearer {TOKEN}x"}):
+            connection = http.client.HTTPConnection(address.host, address.port, timeout=10)
+            connection.request("GET", path, headers=headers)
+            response = connection.getresponse()
+            assert response.status == 401 and b"token" in response.read()
+            connection.close()
+    assert TOKEN not in serving.log.read_text()
 
 
 def test_cancelling_ends_the_job_in_its_process(
@@ -225,5 +242,6 @@ def test_a_job_that_fails_there_says_why(
 
 
 def test_a_stage_that_is_not_served_is_refused(server: Server, photo: np.ndarray) -> None:
-    with pytest.raises(NotServed, match="does not segment"):
-        call(server, "segment", (photo, Prompt((Click(9.0, 9.0),)), BackendChoice("auto")), silent)
+    edit = CoarseEdit(0, 0, photo, photo, np.ones((300, 450), np.float32))
+    with pytest.raises(NotServed, match="does not refine"):
+        call(server, "refine", (edit, RefineOptions("auto")), silent)

@@ -14,7 +14,14 @@ import pytest
 from same_values import same_values
 
 from objectmorpher.server.fitting import is_sound
-from objectmorpher.server.message import LARGE, MessageError, MissingError, decode, encode
+from objectmorpher.server.message import (
+    LARGE,
+    MessageError,
+    MissingError,
+    decode,
+    encode,
+    name_of,
+)
 from objectmorpher.server.table import table, types
 from objectmorpher.worker.job_functions import BackendChoice, Cut
 from objectmorpher_core.base.camera import Camera
@@ -237,3 +244,15 @@ def test_everything_served_is_a_job_function_by_its_own_name() -> None:
 
     for name, row in table().items():
         assert getattr(job_functions, name) is row.function
+
+
+def test_a_photo_has_one_name_with_every_click_and_another_photo_another():
+    small = np.arange(300, dtype=np.uint8).reshape(10, 10, 3)
+    large = np.zeros((1000, 400, 3), np.uint8)
+    names = []
+    for photo in (small, small + np.uint8(1), large, large + np.uint8(1)):
+        for mask in (np.ones((1200, 1200), bool), np.zeros(3, bool)):
+            message = encode((mask, photo), types(), is_split=True)
+            names.append(name_of(decode(message.body, types(), message.blobs)[1], message.blobs))
+            assert (photo.nbytes < LARGE) == (names[-1] not in message.blobs)
+    assert names[::2] == names[1::2] and len(set(names)) == 4

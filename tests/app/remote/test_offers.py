@@ -71,10 +71,3 @@ def test_what_a_server_says_of_itself_is_not_believed() -> None:
     for able in (None, "relief", [7, "", "a\nb", "x" * 99], {"relief": 1}):
         assert read_offers({"lift": {"auto": "relief", "able": able}})["lift"] == Offer("", ())
     assert len(read_offers({"lift": {"able": [f"w{k}" for k in range(999)]}})["lift"].able) < 100
-
-
-def test_a_backend_has_its_own_processes_and_a_models_id_its_familys() -> None:
-    offer = Offer("dino", ("dino", "sam2"))
-    wanted = {"auto": "dino", "sam2": "sam2", "sam2.1-tiny": "sam2", "sam3": "dino", "x": "dino"}
-    assert {name: offer.deployed(name) for name in wanted} == wanted
-    assert Offer("", ()).deployed("qwen") == "auto"

@@ -1,4 +1,4 @@
-"""The server's HTTP side and its client, in one process: who may ask, how much, and for what."""
+"""The server's two HTTP sides and their client: who may ask, how much, and for what."""
 
 from __future__ import annotations
 
@@ -6,15 +6,23 @@ import http.client
 import io
 import json
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
 import served_jobs
+from served_by_ray import PLACED
 from test_message import HOSTILE
 
+from objectmorpher.editor.settings import STAGES
 from objectmorpher.server import client
 from objectmorpher.server.address import Address, ServedError, Server, ServerLost
 from objectmorpher.server.client import hello
@@ -23,19 +31,59 @@ from objectmorpher.server.message import LARGE, digest, encode
 from objectmorpher.server.running import Alone
 from objectmorpher.server.table import types
 from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.model_sets import DRIVER, Card, need_of
+from objectmorpher_core.models import hub_model
+from objectmorpher_core.models.ledger import SPARE, Ledger, Model
+from tests.research.spread.ray_apart import claim_gpu, environment, own_folder
 from tests.tree import over
 
 TOKEN = "a-token-that-is-long-enough"
 MOST = 4 << 20  # bytes of a request
+LIMITS = {"body": MOST, "connections": 16, "jobs": 3}
+CARD = 12 << 30  # bytes of the GPU that Ray Serve believes in
 
 
-@pytest.fixture(scope="module")
-def front() -> Iterator[Front]:
-    limits = RequestLimits(body=MOST, connections=16, jobs=3)
-    front = Front(("127.0.0.1", 0), TOKEN, Alone(), served_jobs.TABLE, limits)
-    front.start()
-    yield front
-    front.close()
+@dataclass(frozen=True)
+class Listening:
+    """Job functions that are served, by this process or by Ray Serve."""
+
+    address: tuple[str, int]
+    stages: tuple[str, ...]
+    taken: float = 0.0  # of a GPU
+
+    def done(self) -> tuple[str, ...]:
+        """What its process has done so far."""
+        return client.call(Server(Address(*self.address), TOKEN), "look", (), silent)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        "this process",
+        pytest.param("Ray Serve", marks=[
+            pytest.mark.slow, pytest.mark.skipif(find_spec("ray") is None, reason="no Ray"),
+        ]),
+    ],
+)  # fmt: skip
+def front(request: pytest.FixtureRequest) -> Iterator[Listening]:
+    if request.param == "this process":
+        own = Front(("127.0.0.1", 0), TOKEN, Alone(), served_jobs.TABLE, RequestLimits(**LIMITS))
+        own.start()
+        yield Listening(own.address, STAGES)
+        own.close()
+        return
+    with own_folder() as folder:
+        own = environment(folder, **claim_gpu(folder, CARD))
+        with subprocess.Popen(
+            [sys.executable, str(Path(__file__).with_name("served_by_ray.py")),
+             json.dumps(LIMITS), TOKEN],
+            env=own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        ) as process:  # fmt: skip
+            assert process.stdin is not None and process.stdout is not None
+            told = json.loads(process.stdout.readline())
+            yield Listening(("127.0.0.1", told["port"]), ("segment", "lift"), told["taken"])
+            process.stdin.close()
+            process.wait(60)
 
 
 @pytest.fixture(autouse=True)
@@ -45,15 +93,15 @@ def test_functions(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def server(front: Front) -> Server:
+def server(front: Listening) -> Server:
     return Server(Address(*front.address), TOKEN)
 
 
 def ask(
-    front: Front, method: str, path: str, body: bytes | None = None, **headers: str
+    front: Listening, method: str, path: str, body: bytes | None = None, **headers: str
 ) -> tuple[int, dict]:
     """Status and answer of a request as anyone might send it."""
-    connection = http.client.HTTPConnection(*front.address, timeout=5)
+    connection = http.client.HTTPConnection(*front.address, timeout=10)
     given = {name.replace("_", "-"): value for name, value in headers.items()}
     try:
         connection.request(method, path, body, {"Authorization": f"Bearer {TOKEN}"} | given)
@@ -70,10 +118,43 @@ def wait_until(is_so: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def test_it_tells_what_it_serves(server: Server) -> None:
+def test_it_tells_what_it_serves(front: Listening, server: Server) -> None:
     told = hello(server)
     assert told["functions"] == sorted(served_jobs.TABLE)
-    assert told["stages"] == {"segment": 1, "lift": 1, "inpaint": 1, "refine": 1}
+    assert told["stages"] == dict.fromkeys(front.stages, 1)
+
+
+def test_on_ray_each_process_asks_for_what_its_networks_take_of_a_gpu(front: Listening) -> None:
+    if "refine" not in front.stages:
+        ledger, wanted = Ledger(Card(CARD, 1 << 40)), []
+        for id in PLACED:
+            need = need_of(hub_model(id))
+            assert need is not None
+            peak = ledger.plan(Model(id, id, need, lambda plan: plan)).peak
+            wanted.append((peak / SPARE + DRIVER) / CARD)
+        assert sum(wanted) < front.taken < sum(wanted) + 0.01
+
+
+def test_requests_beyond_the_limit_are_refused_and_places_come_back(front: Listening) -> None:
+    begun = (
+        f"POST /v1/jobs/halve HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {TOKEN}\r\n"
+        "Content-Length: 1000\r\n\r\n"
+    )
+    held = [socket.create_connection(front.address, timeout=5) for _ in range(16)]
+    for connection in held:
+        connection.sendall(begun.encode())
+    time.sleep(0.5)
+    with suppress(ConnectionError):  # this process closes the connection without a word
+        assert ask(front, "GET", "/v1/hello")[0] == 503
+    for connection in held:
+        connection.close()
+
+    def has_place() -> bool:
+        with suppress(ConnectionError):
+            return ask(front, "GET", "/v1/hello")[0] == 200
+        return False
+
+    wait_until(has_place)
 
 
 def test_an_answer_comes_back_and_steps_are_told(server: Server) -> None:
@@ -96,7 +177,9 @@ def test_large_arrays_are_sent_once(server: Server) -> None:
 @pytest.mark.parametrize(
     "said", ["", "Bearer", "Bearer ", "Bearer wrong", f"Basic {TOKEN}", f"Bearer {TOKEN}x", "ÿ"]
 )
-def test_without_the_token_nothing_is_answered_and_nothing_read(front: Front, said: str) -> None:
+def test_without_the_token_nothing_is_answered_and_nothing_read(
+    front: Listening, said: str
+) -> None:
     for method, path in (
         ("GET", "/v1/hello"), ("GET", "/"), ("POST", "/v1/jobs/halve"), ("PUT", "/v1/blobs/x"),
     ):  # fmt: skip
@@ -111,70 +194,72 @@ def test_without_the_token_nothing_is_answered_and_nothing_read(front: Front, sa
         connection.close()
 
 
-def test_no_header_is_no_token(front: Front) -> None:
+def test_no_header_is_no_token(front: Listening) -> None:
     connection = http.client.HTTPConnection(*front.address, timeout=5)
     connection.request("GET", "/v1/hello")
     assert connection.getresponse().status == 401
     connection.close()
 
 
-def test_too_large_a_body_is_refused_before_it_is_read(front: Front) -> None:
-    for length in (MOST + 1, 10**30):
+def test_too_large_a_body_is_refused_before_it_is_read(front: Listening) -> None:
+    for length in (MOST + 1, 10**17):
         status, told = ask(front, "POST", "/v1/jobs/halve", b"", Content_Length=str(length))
         assert status == 413
         assert "MB" in told["error"]
 
 
 @pytest.mark.parametrize("length", ["", "-1", "1e3", "0x10", "²"])
-def test_a_body_without_a_length_is_refused(front: Front, length: str) -> None:
+def test_a_body_without_a_length_is_refused(front: Listening, length: str) -> None:
     connection = http.client.HTTPConnection(*front.address, timeout=5)
     connection.putrequest("POST", "/v1/jobs/halve")
     connection.putheader("Authorization", f"Bearer {TOKEN}")
     connection.putheader("Content-Length", length.encode("latin-1"))
     connection.endheaders()
-    assert connection.getresponse().status == 411
+    assert connection.getresponse().status in (400, 411)
     connection.close()
 
 
-def test_chunks_are_refused(front: Front) -> None:
+def test_chunks_are_refused(front: Listening) -> None:
     status, _ = ask(front, "POST", "/v1/jobs/halve", None, Transfer_Encoding="chunked")
     assert status == 411
 
 
-def test_a_body_that_breaks_off_is_refused(front: Front) -> None:
+def test_a_body_that_breaks_off_is_refused(front: Listening) -> None:
     with socket.create_connection(front.address, timeout=5) as connection:
         connection.sendall(
             f"POST /v1/jobs/halve HTTP/1.1\r\nAuthorization: Bearer {TOKEN}\r\n"
             "Content-Length: 1000\r\n\r\nabc".encode()
         )
         connection.shutdown(socket.SHUT_WR)
-        assert b" 400 " in connection.recv(1000)
+        said = connection.recv(1000)
+        # Ray's proxy hangs up where its client has.
+        assert b" 400 " in said or (front.taken and not said)
 
 
 @pytest.mark.parametrize(
     "path", ["/v1/jobs/os.system", "/v1/jobs/", "/v1/jobs/__init__", "/v1/jobs/../hello", "/etc"]
 )
-def test_what_is_not_in_the_table_is_not_found(front: Front, path: str) -> None:
+def test_what_is_not_in_the_table_is_not_found(front: Listening, path: str) -> None:
     assert ask(front, "POST", path, encode((), types()).body)[0] == 404
 
 
 @over("name", HOSTILE)
-def test_what_is_no_message_is_refused(front: Front, name: str) -> None:
+def test_what_is_no_message_is_refused(front: Listening, name: str) -> None:
     if len(HOSTILE[name]) <= MOST:
-        before = len(served_jobs.seen)
+        before = front.done()
         status, told = ask(front, "POST", "/v1/jobs/halve", HOSTILE[name])
         assert status == 400, told
-        assert len(served_jobs.seen) == before
+        assert front.done() == before
 
 
-def test_arguments_of_another_type_are_refused(front: Front) -> None:
+def test_arguments_of_another_type_are_refused(front: Listening) -> None:
     for arguments in ((1,), (), (np.zeros(3),), [np.zeros(3, np.float32)]):
         assert ask(front, "POST", "/v1/jobs/halve", encode(arguments, types()).body)[0] == 400
     status, told = ask(front, "POST", "/v1/jobs/count", encode((-1,), types()).body)
     assert (status, told["error"]) == (400, "-1 steps")
 
 
-def test_bytes_under_another_name_are_refused(front: Front) -> None:
+def test_bytes_under_another_name_are_refused(front: Listening) -> None:
     status, _ = ask(front, "PUT", f"/v1/blobs/{digest(b'a')}", b"b")
     assert status == 400
     assert ask(front, "PUT", "/v1/blobs/../../etc/passwd", b"b")[0] == 404
@@ -190,8 +275,8 @@ def test_a_server_that_breaks_down_is_lost_for_the_job(server: Server) -> None:
         client.call(server, "break_down", (), silent)
 
 
-def test_cancelling_ends_the_job_over_there(front: Front, server: Server) -> None:
-    before = served_jobs.seen.count("counted")
+def test_cancelling_ends_the_job_over_there(front: Listening, server: Server) -> None:
+    before = front.done().count("counted")
     start = time.monotonic()
 
     def progress(fraction: float, note: str) -> None:
@@ -202,11 +287,11 @@ def test_cancelling_ends_the_job_over_there(front: Front, server: Server) -> Non
         client.call(server, "count", (5000,), progress)
     assert client.call(server, "count", (1,), silent) == 1  # its place is free again
     assert time.monotonic() - start < 50  # the first one would take 100
-    assert served_jobs.seen.count("counted") == before + 1
+    assert front.done().count("counted") == before + 1
 
 
 def test_jobs_queue_and_the_first_that_finds_no_place_is_told_so(
-    front: Front, server: Server
+    front: Listening, server: Server
 ) -> None:
     notes: list[str] = []
     stop = threading.Event()
@@ -245,10 +330,16 @@ def test_jobs_queue_and_the_first_that_finds_no_place_is_told_so(
 def test_whoever_waits_too_long_goes_elsewhere(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(client, "QUEUE", 0.3)
-    thread = threading.Thread(target=lambda: client.call(server, "count", (60,), silent))
+    runs = threading.Event()
+
+    def progress(fraction: float, note: str) -> None:
+        if note.startswith("step"):
+            runs.set()
+
+    thread = threading.Thread(target=lambda: client.call(server, "count", (60,), progress))
     thread.start()
-    time.sleep(0.2)
+    assert runs.wait(5)
+    monkeypatch.setattr(client, "QUEUE", 0.3)
     with pytest.raises(ServerLost, match="too much to do"):
         client.call(server, "count", (1,), silent)
     thread.join()

@@ -40,6 +40,26 @@ def environment(folder: Path, **more: str) -> dict[str, str]:
     return {k: v for k, v in os.environ.items() if k not in foreign} | own | more
 
 
+def claim_gpu(folder: Path, size: int) -> dict[str, str]:
+    """Variables by which each machine has a GPU of `size` bytes, as its driver would say."""
+    program = folder / "nvidia-smi"
+    program.write_text(f"#!/bin/sh\necho {size >> 20}\n")
+    program.chmod(0o755)
+    cache = str(folder / "cache")
+    return {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}", "OBJECTMORPHER_CACHE": cache}
+
+
+def place_models(*ids: str) -> None:
+    """Folders that look like installed models: their memory is planned by what is published."""
+    from objectmorpher_core import models
+    from objectmorpher_core.models.hub import FileFacts, Locked, write
+
+    for id in ids:
+        (models.folder() / id).mkdir(parents=True)
+        (models.folder() / id / "config.json").write_text("{}")
+        write(id, Locked({"config.json": FileFacts(2, "")}, ""))
+
+
 def told_by(script: str, folder: Path, *arguments: object, **more: str) -> Any:
     """The last line, JSON, of a script beside this file that is run with `arguments`."""
     done = subprocess.run(

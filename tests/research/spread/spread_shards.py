@@ -1,6 +1,7 @@
 """Run as a program by the tests: shards on a Ray of two nodes on this machine, a worker killed.
 
-Arguments: SOURCE OUT NOTES. Prints what happened as JSON.
+Arguments: SOURCE OUT NOTES, and models that seem to be installed, with which each machine has a
+GPU. Prints what happened as JSON.
 """
 
 from __future__ import annotations
@@ -19,23 +20,19 @@ from objectmorpher_research.training.composition import shards as disk
 from objectmorpher_research.training.composition.sources import SourceReading, find_pairs
 from objectmorpher_research.training.composition.spread_shards import write_shards
 from objectmorpher_research.training.composition.triplet import TripletPlan
+from tests.research.spread.ray_apart import place_models
 
 HOW = TripletPlan("auto", "relief", "telea", "same-pose", gaussians=2000)
 SIZE = 2
 
 
-def main(source: Path, out: Path, notes: Path) -> None:
+def main(source: Path, out: Path, notes: Path, *installed: str) -> None:
     from ray.cluster_utils import Cluster
 
-    cluster = Cluster(
-        initialize_head=True,
-        head_node_args={
-            "num_cpus": 1,
-            "object_store_memory": 100 << 20,
-            "include_dashboard": False,
-        },
-    )
-    cluster.add_node(num_cpus=1, object_store_memory=100 << 20)
+    place_models(*installed)
+    small = {"num_cpus": 2, "num_gpus": int(bool(installed)), "object_store_memory": 100 << 20}
+    cluster = Cluster(initialize_head=True, head_node_args=small | {"include_dashboard": False})
+    cluster.add_node(**small)
     cluster.wait_for_nodes()
     parts = disk.shards_of(find_pairs(source, SourceReading(both_ways=False)), SIZE)
     disk.begin(out, parts, HOW)
@@ -44,13 +41,14 @@ def main(source: Path, out: Path, notes: Path) -> None:
     told: list[float] = []
     write_shards(out, parts, HOW, cluster.address, lambda share, note: told.append(share))
     unfinished = len(list(out.glob(f"{disk.UNFINISHED}*")))
-    asked = [tuple(map(int, p.read_text().split())) for p in notes.iterdir()]
+    asked = [tuple(map(int, p.read_text().split()[:2])) for p in notes.iterdir()]
+    gpus = {p.read_text().partition("gpu")[2] for p in notes.iterdir()}
     found = disk.finish(out, parts)
     cluster.shutdown()
     print(json.dumps({
         "shards": [s.name for s in parts], "killed": killed, "unfinished": unfinished,
         "asked": len(asked), "workers": len({a for a, _ in asked}),
-        "nodes": len({b for _, b in asked}), "progress": told, **found,
+        "nodes": len({b for _, b in asked}), "progress": told, "gpus": sorted(gpus), **found,
     }))  # fmt: skip
 
 
@@ -65,4 +63,4 @@ def kill_one(notes: Path, killed: list[int]) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    main(*map(Path, sys.argv[1:4]), *sys.argv[4:])

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from ray_apart import HERE, NEEDS_RAY_DATA, own_folder, told_by
+from ray_apart import HERE, NEEDS_RAY_DATA, claim_gpu, own_folder, told_by
 
 from objectmorpher_research.training.composition.shards import SHARD
 from tests import shapes
@@ -34,7 +34,10 @@ def write_pairs(at: Path) -> Path:
     return at
 
 
-def test_a_killed_worker_loses_nothing_and_each_shard_is_there_once(folder: Path) -> None:
+@pytest.mark.parametrize("installed", [(), ("trellis-image-large",)], ids=["cores", "GPUs"])
+def test_a_killed_worker_loses_nothing_and_each_shard_is_there_once(
+    folder: Path, installed: tuple[str, ...]
+) -> None:
     source, out, notes, workers = (folder / name for name in ("source", "out", "notes", "workers"))
     write_pairs(source)
     for at in (out, notes, workers):
@@ -42,10 +45,14 @@ def test_a_killed_worker_loses_nothing_and_each_shard_is_there_once(folder: Path
     command = json.dumps(["{python}", str(HERE / "pose_worker.py"), str(notes)])
     (workers / "same-pose.toml").write_text(f'name = "same-pose"\ncommand = {command}\n')
     told = told_by(
-        "spread_shards.py", folder, source, out, notes,
+        "spread_shards.py", folder, source, out, notes, *installed,
         OBJECTMORPHER_WORKERS=str(workers), OMP_NUM_THREADS="1",
+        **(claim_gpu(folder, 12 << 30) if installed else {}),
     )  # fmt: skip
-    assert len(told["killed"]) == 1 and told["nodes"] == 2 and told["workers"] >= 3
+    # Two processes do not fit on such a GPU: each has one to itself, and keeps it.
+    assert told["gpus"] == (["0"] if installed else [""])
+    least = 2 if installed else 3  # one more beside the killed one: a GPU has place for one
+    assert len(told["killed"]) == 1 and told["nodes"] == 2 and told["workers"] >= least
     assert told["asked"] > PAIRS  # what the killed one had begun was begun anew
     assert told["unfinished"] >= 1  # and what it left behind is no shard
     assert sorted(p.name for p in out.glob("*shard-*")) == told["shards"]

@@ -76,17 +76,12 @@ def save_adapter(
     import torch
     from peft import get_peft_model_state_dict
 
-    own = parameters(transformer)
-    kept = {name: p.data for name, p in own.items()}
-    try:
-        for name, value in (values or {}).items():
-            own[name].data = value
-        state = get_peft_model_state_dict(transformer)  # type: ignore[arg-type]  # also takes plain
-        kind = getattr(torch, number)
-        state = {name: value.detach().to("cpu", kind).contiguous() for name, value in state.items()}
-    finally:
-        for name, value in kept.items():
-            own[name].data = value
+    state = get_peft_model_state_dict(
+        transformer,  # type: ignore[arg-type]  # also takes plain modules
+        state_dict=values or parameters(transformer),
+    )
+    kind = getattr(torch, number)
+    state = {name: value.detach().to("cpu", kind).contiguous() for name, value in state.items()}
     with tempfile.TemporaryDirectory() as at:
         pipeline = getattr(diffusers, model.pipeline)
         pipeline.save_lora_weights(at, transformer_lora_layers=state, weight_name=FILE)

@@ -30,10 +30,8 @@ class TrainingState:
     optimiser: optim.Optimizer
     mean: dict[str, Tensor] | None  # moving mean of the parameters
 
-    def save(self, folder: Path, step: int, plan: dict[str, Any]) -> None:
-        """After `step` steps of a `plan`."""
-        from safetensors.torch import save
-
+    def held(self) -> dict[str, Tensor]:
+        """All of it, on the CPU; where it is sharded each process has to ask."""
         held: dict[str, Tensor] = {}
         for name, value in self.parameters.items():
             held[VALUE + name] = value.detach()
@@ -42,7 +40,12 @@ class TrainingState:
                 held[FIRST + name], held[SECOND + name] = memory["exp_avg"], memory["exp_avg_sq"]
             if self.mean is not None:
                 held[MEAN + name] = self.mean[name]
-        held = {name: value.contiguous().cpu() for name, value in held.items()}
+        return {name: whole(value).contiguous().cpu() for name, value in held.items()}
+
+    def save(self, folder: Path, step: int, plan: dict[str, Any], held: dict[str, Tensor]) -> None:
+        """What is `held` after `step` steps of a `plan`."""
+        from safetensors.torch import save
+
         told = json.dumps({"step": step, "plan": plan})
         write_all({folder / FILE: save(held, metadata={TOLD: told})})
 
@@ -62,19 +65,34 @@ class TrainingState:
                 told = json.loads((file.metadata() or {})[TOLD])
                 _check_plan(folder, told["plan"], plan)
                 for name, value in self.parameters.items():
-                    value.data.copy_(file.get_tensor(VALUE + name))
+                    value.data.copy_(like(file.get_tensor(VALUE + name), value))
                     self.optimiser.state[value] = {
                         "step": torch.tensor(float(told["step"])),
-                        "exp_avg": file.get_tensor(FIRST + name).to(value.device),
-                        "exp_avg_sq": file.get_tensor(SECOND + name).to(value.device),
+                        "exp_avg": like(file.get_tensor(FIRST + name), value),
+                        "exp_avg_sq": like(file.get_tensor(SECOND + name), value),
                     }
                     if self.mean is not None:
-                        self.mean[name].copy_(file.get_tensor(MEAN + name))
+                        self.mean[name].copy_(like(file.get_tensor(MEAN + name), value))
                 return int(told["step"])
         except (OSError, KeyError, ValueError, RuntimeError, SafetensorError) as error:
             if isinstance(error, TrainingError):
                 raise
             raise TrainingError(f"{at} is damaged: {error}") from error
+
+
+def whole(value: Any) -> Tensor:
+    """A tensor of which this process may have a shard; then each process has to ask."""
+    return value.full_tensor() if hasattr(value, "full_tensor") else value
+
+
+def like(value: Tensor, other: Any) -> Tensor:
+    """A whole tensor on another one's device, and sharded as that is."""
+    value = value.to(other.device)
+    if not hasattr(other, "full_tensor"):
+        return value
+    from torch.distributed.tensor import distribute_tensor
+
+    return distribute_tensor(value, other.device_mesh, other.placements)
 
 
 def _check_plan(folder: Path, known: dict[str, Any], plan: dict[str, Any]) -> None:

@@ -6,10 +6,13 @@ import hashlib
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from objectmorpher_core.models.plans import QUANTISER, has_quantiser
+
 from . import TrainingError
 from .triplet_folder import Stored
 
 NUMBERS = ("auto", "bfloat16", "float32")
+BASES = ("whole", "nf4")  # of the frozen network: as it is, or in four bits (QLoRA)
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class LoraPlan:
     held_out: int = 4  # triplets that are not trained on, but looked at
     number: str = "bfloat16"
     seed: int = 0
+    base: str = "whole"  # of BASES
 
     def check(self) -> None:
         """Raises TrainingError."""
@@ -41,6 +45,10 @@ class LoraPlan:
             raise TrainingError("rate, ratio and the longest gradient are above 0")
         if not (0 <= self.mean < 1 and self.decay >= 0 and self.warm_up >= 0 and self.seed >= 0):
             raise TrainingError("decay, warm-up and seed are not negative, the mean is below 1")
+        if self.base not in BASES:
+            raise TrainingError(f"the base is one of {', '.join(BASES)}, not {self.base!r}")
+        if self.base == "nf4" and not has_quantiser():
+            raise TrainingError(f"a base in four bits needs {QUANTISER}: `pip install {QUANTISER}`")
         if self.held_out < 0:
             raise TrainingError("the number of triplets held out is not negative")
 

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from . import adapter, edit_models
+from . import TrainingError, adapter, edit_models
 from .edit_models import EditModel
 from .lora_plan import LoraPlan
 from .train_lora import optimiser_of, prepared
@@ -33,6 +33,8 @@ def measure(plan: LoraPlan, count: int = 3, size: dict[str, Any] | None = None) 
     import torch
 
     plan.check()
+    if plan.base != "whole":
+        raise TrainingError("a measurement is of whole weights: what four bits take is estimated")
     model = edit_models.load(plan.model)
     device = "cuda" if torch.cuda.is_available() else "cpu"
     began = time.perf_counter()
@@ -47,7 +49,7 @@ def measure(plan: LoraPlan, count: int = 3, size: dict[str, Any] | None = None) 
     steps = []
     for _ in range(count):
         began = time.perf_counter()
-        _step(model, transformer, optimiser, at, device)
+        step_of(model, transformer, optimiser, at, device)
         _wait(device)
         steps.append(time.perf_counter() - began)
     is_gpu = device == "cuda"
@@ -80,14 +82,16 @@ def random_transformer(
     return transformer
 
 
-def _step(model: EditModel, transformer: Any, optimiser: Any, at: Any, device: str) -> None:
+def step_of(model: EditModel, transformer: Any, optimiser: Any, at: Any, device: str) -> None:
+    """One step of a training on made-up latents; on "meta" nothing is computed."""
     import torch
 
     noise = torch.randn_like(at.target)
     noisy = 0.5 * at.target + 0.5 * noise
     is_half = at.target.dtype == torch.bfloat16
     sigma = torch.full((1,), 0.5, device=device, dtype=at.target.dtype)
-    with torch.autocast(device, torch.bfloat16, enabled=is_half):
+    kind = "cpu" if device == "meta" else device
+    with torch.autocast(kind, torch.bfloat16, enabled=is_half and device != "meta"):
         found = model.velocity(transformer, noisy, sigma, at)
     loss = torch.nn.functional.mse_loss(found.float(), (noise - at.target).float())
     loss.backward()

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from objectmorpher.server.spread import spread
 from objectmorpher_core.base.progress import Progress
 
+STAGES = ("segment", "lift", "inpaint")  # whose networks make a triplet
+
 if TYPE_CHECKING:
     from .shards import Shard
     from .triplet import TripletPlan
@@ -23,7 +25,7 @@ def write_shards(
     """
     common = {"out": str(out.absolute()), "how": asdict(how)}
     jobs = [common | {"shard": asdict(shard)} for shard in shards]
-    for done, _ in enumerate(spread(_written, jobs, address), 1):
+    for done, _ in enumerate(spread(_written, jobs, address, STAGES), 1):
         progress(done / len(shards), f"{done} of {len(shards)} shards")
 
 

@@ -1,21 +1,23 @@
 """Trains the composition LoRA: flow matching on [B, coarse A] -> A (paper 3.3).
 
 x_s = (1 - s) A + s noise, and the transformer learns noise - A at the noise levels s that its
-sampler visits. Every process of Accelerate holds the whole transformer and takes its part of each
-step's triplets; only the adapter's gradients travel.
+sampler visits. Every process of Accelerate takes its part of each step's triplets. It holds the
+whole transformer, and only the adapter's gradients travel; or, by Accelerate's FSDP, a shard of it.
 """
 
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from objectmorpher_core.base.progress import Progress, silent
+from objectmorpher_core.compose.refine.diffusion import WHOLE
 
 from . import TrainingError, adapter, edit_models
-from .checkpoint import TrainingState
+from .checkpoint import TrainingState, whole
 from .edit_models import EditModel, Latents
 from .latents_cache import Encoding, LatentsCache, weights_fingerprint
 from .lora_plan import LoraPlan, parted
@@ -74,12 +76,15 @@ class Trainer:
         self._encode(everything, progress)
         self.scheduler = edit_models.scheduler_of(places.weights)
         progress(0.0, "Loading the transformer")
-        self.transformer = adapter.with_adapter(
-            opened(self.model, places.weights, plan.number), self.model, plan.rank, plan.seed
-        ).to(self.device)
-        prepared(self.transformer)
-        self.parameters = adapter.parameters(self.transformer)
-        self.optimiser = optimiser_of(self.transformer, plan)
+        network = adapter.with_adapter(
+            opened(self.model, places.weights, plan, self.device), self.model, plan.rank, plan.seed
+        )
+        prepared(network)
+        self.transformer, self.optimiser = self.accelerator.prepare(
+            network, optimiser_of(network, plan)
+        )
+        self.network = self.accelerator.unwrap_model(self.transformer, keep_torch_compile=False)
+        self.parameters = adapter.parameters(self.network)
         own = {name: p.detach().clone() for name, p in self.parameters.items()}
         self.mean = own if plan.mean else None
         weights = weights_fingerprint(places.weights, ("transformer",))
@@ -99,23 +104,27 @@ class Trainer:
             self.step += 1
             if course.looked and self.step % course.looked == 0 and self.held_out:
                 row["checked"] = self.checked()
-                if is_first and course.sampled:
+                if course.sampled:
                     self._show(course.sampled)
             if log is not None:
                 log.add(row)
                 progress(self.step / course.steps, f"step {self.step}, loss {row['loss']:.4f}")
-                if self.step % course.saved == 0 or self.step == course.steps:
-                    self.save()
+            if self.step % course.saved == 0 or self.step == course.steps:
+                self.save()
         self.accelerator.wait_for_everyone()
         if log is not None:
             log.close()
-        return self.save() if is_first else self.places.out
+        return self.save()
 
     def save(self) -> Path:
-        """A checkpoint, and the LoRA as it is now; its file."""
-        self.state.save(self.places.out, self.step, self._facts)
+        """A checkpoint, and the LoRA as it is now; its file. To be called by each process."""
+        held = self.state.held()
+        values = {name: whole(value) for name, value in (self.mean or self.parameters).items()}
+        if not self.accelerator.is_main_process:
+            return self.places.out
+        self.state.save(self.places.out, self.step, self._facts, held)
         return adapter.save_adapter(
-            self.places.out / "lora", self.transformer, self.model, self.plan.number, self.mean
+            self.places.out / "lora", self.network, self.model, self.plan.number, values
         )
 
     def losses(self, numbers: range) -> Tensor:
@@ -127,18 +136,23 @@ class Trainer:
 
         world, own = self.accelerator.num_processes, self.accelerator.process_index
         total = torch.zeros((), device=self.device)
-        for place, number in enumerate(numbers):
-            if place % world == own:
-                triplet = self.trained_on[chosen(self.plan.seed, number, len(self.trained_on))]
-                loss = self._loss(self.cache.read(triplet, self.device), number) / len(numbers)
-                self.accelerator.backward(loss)
-                total += loss.detach()
+        rounds = -(-len(numbers) // world)
+        for k in range(rounds):  # as many for each process: shards are gathered by all together
+            place = k * world + own
+            number = numbers[min(place, len(numbers) - 1)]
+            share = 1 / len(numbers) if place < len(numbers) else 0.0
+            triplet = self.trained_on[chosen(self.plan.seed, number, len(self.trained_on))]
+            is_last = k == rounds - 1
+            with nullcontext() if is_last else self.accelerator.no_sync(self.transformer):
+                loss = self._loss(self.cache.read(triplet, self.device), number) * share
+                self.accelerator.backward(loss * world)  # of which the mean over processes is taken
+            total += loss.detach()
         for value in self.parameters.values():
             if value.grad is None:  # of what the last block does with the text: nobody reads it
                 value.grad = torch.zeros_like(value)
-        if world > 1:
-            self._sum_up(total)
-        return total
+        found = self.accelerator.reduce(total, reduction="sum")
+        assert isinstance(found, torch.Tensor)
+        return found
 
     def checked(self) -> float:
         """Mean loss of the triplets held out, at noise that is always the same."""
@@ -161,7 +175,7 @@ class Trainer:
         self.optimiser.zero_grad(set_to_none=True)
         loss = self.losses(range(self.step * plan.batch, (self.step + 1) * plan.batch))
         own = list(self.parameters.values())
-        self.length = float(torch.nn.utils.clip_grad_norm_(own, plan.steepest))
+        self.length = float(whole(torch.nn.utils.clip_grad_norm_(own, plan.steepest)))
         if not (torch.isfinite(loss) and self.length < float("inf")):
             raise TrainingError(f"the loss of step {self.step} is no number: lower --rate")
         self.optimiser.step()
@@ -182,19 +196,6 @@ class Trainer:
         with self.accelerator.autocast():
             found = self.model.velocity(self.transformer, noisy, sigma.to(noisy.dtype), at)
         return torch.nn.functional.mse_loss(found.float(), noise - target)
-
-    def _sum_up(self, total: Tensor) -> None:
-        """Gradients and loss of all processes, added."""
-        import torch
-
-        own = list(self.parameters.values())
-        parts = [p.grad.reshape(-1) for p in own if p.grad is not None]
-        flat = torch.cat([total.reshape(1), *parts])
-        flat = self.accelerator.reduce(flat, reduction="sum")
-        assert isinstance(flat, torch.Tensor)
-        total.copy_(flat[0])
-        for p, part in zip(own, flat[1:].split([p.numel() for p in own]), strict=True):
-            p.grad = part.reshape(p.shape)
 
     def _encode(self, triplets: tuple[Stored, ...], progress: Progress) -> None:
         world, own = self.accelerator.num_processes, self.accelerator.process_index
@@ -219,27 +220,46 @@ def _be_quiet() -> None:
 
 def accelerator_of(number: str) -> Accelerator:
     """The processes of this training, as `accelerate launch` (or torchrun) started them."""
-    from accelerate import Accelerator
+    from accelerate import Accelerator, DistributedDataParallelKwargs
 
     from objectmorpher_core.models import device
 
     is_cpu = "cuda" not in device.devices()
     mixed = "bf16" if number == "bfloat16" else "no"
-    return Accelerator(mixed_precision=mixed, cpu=is_cpu)
+    # The last block's text is read by nobody: its adapter gets no gradient.
+    unused = DistributedDataParallelKwargs(find_unused_parameters=True)
+    found = Accelerator(mixed_precision=mixed, cpu=is_cpu, kwargs_handlers=[unused])
+    if found.distributed_type == "FSDP" and not found.is_fsdp2:
+        raise TrainingError("a LoRA is sharded by FSDP 2: choose it in `accelerate config`")
+    return found
 
 
-def opened(model: EditModel, weights: Path, number: str) -> nn.Module:
-    """The pipeline's transformer. Raises TrainingError."""
+def opened(model: EditModel, weights: Path, plan: LoraPlan, device: str) -> nn.Module:
+    """The pipeline's transformer; in four bits on the `device`. Raises TrainingError."""
     import torch
 
+    number, more = getattr(torch, plan.number), {}
+    if plan.base == "nf4":
+        more = {"quantization_config": in_four_bits(number), "device_map": {"": device}}
     try:
         return model.transformer_class().from_pretrained(
-            weights / "transformer", dtype=getattr(torch, number), local_files_only=True,
-            use_safetensors=True,
+            weights / "transformer", dtype=number, local_files_only=True, use_safetensors=True,
+            **more,
         )  # fmt: skip
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         told = " ".join(str(error).split())[:300]
         raise TrainingError(f"{weights}'s transformer cannot be opened: {told}") from error
+
+
+def in_four_bits(number: Any) -> Any:
+    """QLoRA's base (Dettmers et al. 2023): NF4, its scales quantised too, layers as refiners'."""
+    from diffusers.quantizers.quantization_config import BitsAndBytesConfig
+
+    return BitsAndBytesConfig(
+        load_in_4bit=True, bnb_4bit_quant_type="nf4", bnb_4bit_use_double_quant=True,
+        bnb_4bit_compute_dtype=number, bnb_4bit_quant_storage=number,  # FSDP shards no bytes
+        llm_int8_skip_modules=list(WHOLE),
+    )  # fmt: skip
 
 
 def prepared(transformer: Any) -> None:

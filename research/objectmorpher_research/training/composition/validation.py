@@ -24,17 +24,25 @@ SAMPLE = 1 << 41  # the first number of the draws
 
 
 def write_pictures(trainer: Trainer, steps: int) -> None:
-    """`validation/NAME-STEP.png` for each, with the same noise every time."""
+    """`validation/NAME-STEP.png` for each, with the same noise every time.
+
+    Each process calls it: it may hold a shard of the transformer.
+    """
     import torch
 
-    decoder = _decoder(trainer.model, trainer.places.weights, trainer.device, trainer.plan.number)
+    weights, number = trainer.places.weights, trainer.plan.number
     folder = trainer.places.out / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
+    is_first = trainer.accelerator.is_main_process
     trainer.transformer.eval()
     for k, triplet in enumerate(trainer.held_out):
         at = trainer.cache.read(triplet, trainer.device)
         with torch.no_grad():
-            made = trainer.model.decode(decoder, sampled(trainer, at, steps, k), at.grids[0])
+            tokens = sampled(trainer, at, steps, k)
+            if not is_first:
+                continue
+            decoder = _decoder(trainer.model, weights, trainer.device, number)
+            made = trainer.model.decode(decoder, tokens, at.grids[0])
         b, coarse, a = triplet.read()
         row = np.hstack([_as_large(p, made) for p in (b, coarse, made, a)])
         name = f"{triplet.name}-{trainer.step:06d}.png"

@@ -25,11 +25,12 @@ from train_in_process import COURSE, PLAN  # noqa: E402
 from objectmorpher_core import models  # noqa: E402
 from objectmorpher_core.base.progress import silent  # noqa: E402
 from objectmorpher_core.compose import refine  # noqa: E402
-from objectmorpher_core.compose.refine.diffusion import INSTRUCTION  # noqa: E402
+from objectmorpher_core.compose.refine.diffusion import INSTRUCTION, WHOLE  # noqa: E402
 from objectmorpher_research.training.composition import (  # noqa: E402
     TrainingError,
     adapter,
     edit_models,
+    estimate,
     lora_plan,
     measure,
     train_lora,
@@ -230,7 +231,11 @@ def test_killed_and_called_again_it_has_the_same_losses(folder, weights):
 
 
 def lora_bytes(folder: Path) -> bytes:
-    return next((folder / "lora").glob("*.safetensors")).read_bytes()
+    return lora_file(folder).read_bytes()
+
+
+def lora_file(folder: Path) -> Path:
+    return next((folder / "lora").glob("*.safetensors"))
 
 
 def test_it_does_not_go_on_with_another_plan(folder, weights):
@@ -245,29 +250,38 @@ def test_it_does_not_go_on_with_another_plan(folder, weights):
 
 
 @pytest.mark.slow
-def test_two_processes_have_the_gradients_of_one(folder, weights, tmp_path):
+@pytest.mark.parametrize("how", ["gradients", "sharded"])
+def test_two_processes_have_the_gradients_of_one_and_learn_as_it_does(
+    how, folder, weights, tmp_path
+):
     from safetensors.torch import load_file
 
-    trainer = Trainer(made_up.places(folder, weights["qwen"], "gradients"), PLAN)
+    trainer = Trainer(made_up.places(folder, weights["qwen"], f"{how}-alone"), PLAN)
     loss = trainer.losses(range(5)).reshape(1)
     grads = {name: p.grad for name, p in trainer.parameters.items() if p.grad is not None}
     alone = {name: value.cpu() for name, value in (grads | {"loss": loss}).items()}
     file = tmp_path / "two.safetensors"
-    run_gradients(folder, weights["qwen"], file)
+    run_two(how, folder, weights["qwen"], file)
     together = load_file(file)
     assert alone.keys() == together.keys() and len(alone) > 10
     for name, value in alone.items():
         scale = max(float(value.abs().max()), 1e-8)
         assert float((value - together[name]).abs().max()) <= F32 * scale, name
     assert sum(float(v.abs().sum()) for v in alone.values()) > 0
+    if how == "sharded":  # stopped after two steps, and gone on
+        trainer.train(Course(4, saved=4, looked=0))
+        ours, theirs = (load_file(lora_file(at)) for at in (trainer.places.out, folder / how))
+        assert ours.keys() == theirs.keys()
+        for name, value in ours.items():
+            assert float((value - theirs[name]).abs().max()) < 0.02 * PLAN.rate, name
 
 
-def run_gradients(folder: Path, weights: Path, file: Path) -> None:
+def run_two(how: str, folder: Path, weights: Path, file: Path) -> None:
     """Of two processes over gloo, as `accelerate launch` starts them."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    command = [sys.executable, str(PROGRAM), "gradients", str(folder), str(weights), str(file)]
+    command = [sys.executable, str(PROGRAM), how, str(folder), str(weights), str(file)]
     processes = []
     for rank in range(2):
         more = {
@@ -277,6 +291,79 @@ def run_gradients(folder: Path, weights: Path, file: Path) -> None:
         }  # fmt: skip
         processes.append(subprocess.Popen(command, env=os.environ | more))
     assert [process.wait(300) for process in processes] == [0, 0]
+
+
+@pytest.mark.parametrize("name", edit_models.BACKENDS)
+def test_a_base_in_four_bits_learns_and_takes_what_was_estimated(
+    name, folder, weights, monkeypatch
+):
+    """On the CPU, which bitsandbytes can and diffusers refuses."""
+    pytest.importorskip("bitsandbytes")
+    from diffusers.quantizers.bitsandbytes import BnB4BitDiffusersQuantizer
+
+    monkeypatch.setattr(BnB4BitDiffusersQuantizer, "validate_environment", lambda *_, **__: None)
+    plan = replace(plan_of(name), base="nf4")
+    trainer = Trainer(made_up.places(folder, weights[name], f"nf4-{name}"), plan)
+    frozen = {n: p for n, p in trainer.network.named_parameters() if not p.requires_grad}
+    short = {n for n, p in frozen.items() if type(p).__name__ == "Params4bit"}
+    assert short and not any(kept in name for name in short for kept in WHOLE)
+    size = sum(p.numel() * p.element_size() for p in frozen.values())
+    told = estimate.weights_of(
+        train_lora.opened(trainer.model, weights[name], plan_of(name), "cpu")
+    )
+    assert size <= told[1] <= 1.1 * size < told[0]  # beside the scales
+    with torch.no_grad():
+        before = mean_loss(trainer, range(4))
+    file = trainer.train(Course(8, saved=8, looked=0))
+    with torch.no_grad():
+        assert mean_loss(trainer, range(4)) < before
+    models.use_folder(IDS[name], weights[name])
+    models.use_folder(f"{name}-refine-lora", file.parent)
+    one = made_up.triplet(1)
+    refine.load(name).refine(one.b, one.coarse, np.ones(one.coarse.shape[:2], np.float32), silent)
+    models.remove_hub(f"{name}-refine-lora")
+
+
+def test_the_estimate_is_what_a_step_takes():
+    """On the CPU, in single precision, as PyTorch's profiler sees it."""
+    from torch.profiler import ProfilerActivity, profile
+
+    plan = lora_plan.LoraPlan("klein", 256, rank=4, number="float32")
+    size = TINY["klein"] | {"num_layers": 3, "num_single_layers": 5}
+    model = edit_models.load("klein")
+    network = measure.random_transformer(model, "cpu", "float32", size)
+    network = adapter.with_adapter(network, model, plan.rank, 0)
+    train_lora.prepared(network)
+    optimiser = train_lora.optimiser_of(network, plan)
+    at = model.made_up(plan.side, "float32", "cpu")
+    measure.step_of(model, network, optimiser, at, "cpu")
+    with profile(activities=[ProfilerActivity.CPU], profile_memory=True) as seen:
+        measure.step_of(model, network, optimiser, at, "cpu")
+    assert seen.profiler is not None and seen.profiler.kineto_results is not None
+    events = [e for e in seen.profiler.kineto_results.events() if e.name() == "[memory]"]
+    changes = [e.nbytes() for e in sorted(events, key=lambda e: e.start_ns())]
+    most = max(np.cumsum(changes))
+    learned = sum(p.numel() for p in adapter.parameters(network).values())
+    found = estimate.table(plan, size)["float32"]
+    assert found.learned == 16 * learned
+    assert found.weights == 4 * (sum(p.numel() for p in network.parameters()) - learned)
+    given = sum(t.numel() * 4 for t in (at.target, at.conditions, at.embedding))
+    # The profiler did not see AdamW's memory being made, nor what is given.
+    assert found.step == pytest.approx(most + given - 4 * learned, rel=0.05)
+
+
+def test_it_says_which_cards_hold_a_plan():
+    plan = lora_plan.LoraPlan("qwen", rank=16)
+    ways = estimate.table(plan)
+    told = estimate.told(plan, ways)
+    assert told.count("\n") == len(ways) == 5
+    assert 40 << 30 < ways["bfloat16"].whole < 52 << 30 and ways["bfloat16"].fits(80 << 30)
+    assert ways["nf4"].fits(24 << 30) and not ways["nf4"].fits(16 << 30)
+    larger = estimate.table(replace(plan, rank=64))["bfloat16"]
+    assert larger.learned == 4 * ways["bfloat16"].learned
+    assert estimate.table(replace(plan, side=1536))["bfloat16"].step > ways["bfloat16"].step
+    with pytest.raises(TrainingError, match="one of whole, nf4, not 'int8'"):
+        replace(plan, base="int8").check()
 
 
 def test_order_and_noise_depend_on_seed_and_number_alone():
@@ -342,12 +429,16 @@ def test_what_cannot_be_trained_is_one_sentence(folder, weights, tmp_path):
         triplets_in(tmp_path)
     with pytest.raises(TrainingError, match="too few to hold 40"):
         lora_plan.parted(triplets_in(folder / "triplets"), replace(PLAN, held_out=40))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lora_plan, "has_quantiser", lambda: False)
+        with pytest.raises(TrainingError, match="four bits needs bitsandbytes: `pip install"):
+            replace(PLAN, base="nf4").check()
     with pytest.raises(TrainingError, match="no multiple of 32"):
         replace(PLAN, side=1000).check()
     with pytest.raises(TrainingError, match="holds a Flux2KleinPipeline, not a Qwen"):
         edit_models.folder_of(edit_models.load("qwen"), weights["klein"])
     with pytest.raises(TrainingError, match="cannot be opened"):
-        train_lora.opened(edit_models.load("qwen"), tmp_path, "float32")
+        train_lora.opened(edit_models.load("qwen"), tmp_path, PLAN, "cpu")
 
 
 def test_a_log_that_was_cut_off_in_a_line_is_read(tmp_path):
