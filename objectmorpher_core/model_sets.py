@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from . import models
 from .base.progress import Progress, part, silent
-from .compose.plate import inpaint_pixelhacker
+from .compose.plate import inpaint_latent
 from .compose.refine import klein, qwen
 from .compose.refine.diffusion import DiffusionRefiner
 from .lift.trellis import lifter
@@ -172,8 +172,8 @@ def need_of(model: HubModel) -> Needs | None:
         return Need(numbers, sam_torch.WORK[model.family])
     if model.family in ("trellis", "cupid"):
         return lifter.need()
-    if model.family == "pixelhacker":
-        return inpaint_pixelhacker.need(numbers)
+    if model.family in inpaint_latent.TITLES:
+        return inpaint_latent.need(numbers)
     if model.family not in PIPELINES:
         return None
     refiner, counts = PIPELINES[model.family]

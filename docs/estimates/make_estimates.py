@@ -29,8 +29,7 @@ from published import (
 )
 
 from objectmorpher_core import models
-from objectmorpher_core.compose.plate import inpaint_pixelhacker
-from objectmorpher_core.compose.plate import pixelhacker as sampler
+from objectmorpher_core.compose.plate import inpaint_latent, latent_diffusion
 from objectmorpher_core.compose.refine import klein, qwen
 from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
 from objectmorpher_core.lift.trellis import lifter
@@ -139,15 +138,17 @@ def _lifters() -> Iterator[Row]:
 
 
 def _inpainters() -> Iterator[Row]:
-    unet, codec = build("pixelhacker"), build("pixelhacker-vae")
+    codec = build("pixelhacker-vae")
     ids = torch.zeros(2, 10, dtype=torch.long, device="meta")
-    step = operations(unet, lambda m: m(normal(2, 9, 64, 64), normal(2), ids))
-    work = (sampler.STEPS - 1) * step
-    work += operations(codec, lambda m: (m.encode(_photo(512)), m.decode(normal(1, 4, 64, 64))))
-    count = parameters(unet) + parameters(codec)
-    need = inpaint_pixelhacker.need(count)
-    yield Row("`pixelhacker`, a square; float32", count, need.bytes("float32"), work)
-    yield Row("GPU, bfloat16", count, need.bytes("bfloat16"), work, has_cpu=False)
+    drawn = operations(codec, lambda m: (m.encode(_photo(512)), m.decode(normal(1, 4, 64, 64))))
+    for name in ("pixelhacker", "moebius"):
+        unet = build(name)
+        step = operations(unet, lambda m: m(normal(2, 9, 64, 64), normal(2), ids))
+        work = (latent_diffusion.STEPS - 1) * step + drawn
+        count = parameters(unet) + parameters(codec)
+        need = inpaint_latent.need(count)
+        yield Row(f"`{name}`, a square; float32", count, need.bytes("float32"), work)
+        yield Row("GPU, bfloat16", count, need.bytes("bfloat16"), work, has_cpu=False)
     for name in ("lama", "migan"):
         yield _of_file(name, models.hub_model(name).size)
 

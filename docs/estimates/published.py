@@ -13,8 +13,9 @@ import transformers
 from torch import Tensor, nn
 from torch.utils.flop_counter import FlopCounterMode
 
-from objectmorpher_core.compose.plate.pixelhacker import PUBLISHED
-from objectmorpher_core.compose.plate.pixelhacker import build as build_pixelhacker
+from objectmorpher_core.compose.plate.latent_diffusion import build as build_latent
+from objectmorpher_core.compose.plate.moebius import Moebius
+from objectmorpher_core.compose.plate.pixelhacker import PixelHacker
 from objectmorpher_core.lift.trellis.parts import build as build_part
 
 d: Any = diffusers  # whose names are lazy
@@ -126,7 +127,8 @@ def _networks() -> dict[str, Callable[[], nn.Module]]:
         "sam3": lambda: t.Sam3TrackerModel(t.Sam3TrackerConfig()),
         "dino": lambda: t.Dinov2WithRegistersModel(t.Dinov2WithRegistersConfig(**DINO)),
         "depth": _depth,
-        "pixelhacker": lambda: build_pixelhacker(PUBLISHED),
+        "pixelhacker": lambda: build_latent(PixelHacker),
+        "moebius": lambda: build_latent(Moebius),
         "pixelhacker-vae": _codec,
         "qwen": d.QwenImageTransformer2DModel,
         "qwen-vae": d.AutoencoderKLQwenImage,

@@ -68,7 +68,8 @@ REFINERS: tuple[str, ...] = (
 )  # what is done to a moved object so that it fits in
 
 BACKENDS = {  # best first; the last one is always there
-    "pixelhacker": "objectmorpher_core.compose.plate.inpaint_pixelhacker:PixelHackerInpainter",
+    "pixelhacker": "objectmorpher_core.compose.plate.inpaint_latent:pixelhacker",
+    "moebius": "objectmorpher_core.compose.plate.inpaint_latent:moebius",
     "lama": "objectmorpher_core.compose.plate.inpaint_onnx:lama",
     "migan": "objectmorpher_core.compose.plate.inpaint_onnx:migan",
     "patchmatch": "objectmorpher_core.compose.plate.inpaint_patchmatch:PatchMatchInpainter",

@@ -264,7 +264,7 @@ class EditScript:
     )  # fmt: skip
     inpaint: str = _option(
         "auto", TEXT, (PHOTO, BACKENDS), "NAME",
-        "auto, pixelhacker, lama, migan, patchmatch or telea",
+        "auto, pixelhacker, moebius, lama, migan, patchmatch or telea",
     )  # fmt: skip
     lift: str = _option(
         "auto", TEXT, (SHAPE, BACKENDS), "NAME", "auto, relief, trellis, cupid, or a worker"

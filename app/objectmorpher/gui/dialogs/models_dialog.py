@@ -234,7 +234,8 @@ def _lower(text: str) -> str:
 
 NAMES = {
     "sam2": "SAM 2.1", "sam3": "SAM 3", "sam": "SAM", "sam-onnx": "Small SAMs (ONNX)",
-    "pixelhacker": "PixelHacker", "lama": "LaMa", "migan": "MI-GAN",
+    "pixelhacker": "PixelHacker", "moebius": "Moebius",
+    "pixelhacker-vae": "PixelHacker's autoencoder", "lama": "LaMa", "migan": "MI-GAN",
     "trellis": "TRELLIS", "cupid": "CUPID", "dinov2-with-registers": "DINOv2 with registers",
     "depth-anything": "Depth Anything V2, by PyTorch", "depth-graph": "Depth, without a GPU",
     "qwen-image-edit": "Qwen-Image-Edit",
@@ -250,6 +251,8 @@ GAINS = {
     "sam": "The first of its kind, which the paper uses",
     "sam-onnx": "Smaller and quicker, without PyTorch",
     "pixelhacker": "Invents what is behind objects, for a GPU: the paper's",
+    "moebius": "The same with a quarter of the numbers; also needs PixelHacker's autoencoder",
+    "pixelhacker-vae": "What Moebius draws with; PixelHacker brings it, too",
     "lama": "Invents what is behind large objects, without a GPU",
     "migan": "Invents what is behind objects, the quickest",
     "trellis": "The whole object from one picture, for a GPU: the paper's",
