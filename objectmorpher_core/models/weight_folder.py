@@ -13,7 +13,7 @@ from typing import Any
 
 from ..base.limits import WEIGHTS_HEADER as MOST_HEADER
 from ..base.quoting import named, shown
-from .registry import ModelError
+from .registry import ModelError, hub_models
 
 CONFIG = "config.json"
 PIPELINE = "pipeline.json"
@@ -27,6 +27,7 @@ CODEC = "vae"  # folder of an autoencoder
 # Families of a network, perhaps in a folder of its own, and an autoencoder -> which must be there.
 LATENT = {"pixelhacker": ("network", CODEC), "moebius": ("network",), "pixelhacker-vae": (CODEC,)}
 NETWORK = "diffusion_pytorch_model"  # what diffusers calls its files
+TRIPOSPLAT = "triposplat"  # its files are named in the registry
 INDEX = "model_index.json"
 ADAPTER = ("-lora", "-lightning")  # endings of the families that are one file beside a model
 # Networks of a pipeline that must be there; diffusers' names.
@@ -47,6 +48,11 @@ def check_folder(family: str, at: Path) -> tuple[str, ...]:
     names = sorted(path.name for path in at.iterdir() if path.is_file())
     if family in LATENT:
         return _latent(family, at, names)
+    if family == TRIPOSPLAT:
+        files = next(model.files for model in hub_models() if model.family == family)
+        for name in files:
+            check_safetensors(at / name)
+        return files
     if family in ONE_GRAPH:
         graphs = tuple(name for name in names if name.endswith(GRAPH))
         if len(graphs) != 1:
