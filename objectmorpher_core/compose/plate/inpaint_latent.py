@@ -15,7 +15,7 @@ from ...models import ModelError, device, ledger
 from ...models.plans import Need, Plan
 from ...models.weight_folder import CODEC, count_parameters
 from .. import InpaintError
-from .hole_squares import fill_squares
+from .hole_squares import Filler, fill_squares
 
 TITLES = {"pixelhacker": "PixelHacker", "moebius": "Moebius"}
 CODECS = ("pixelhacker", "pixelhacker-vae")  # models that have the autoencoder of both
@@ -67,7 +67,8 @@ class LatentInpainter:
                 def fill(picture: F32, inside: Mask, step: Progress, seed: int) -> F32:
                     return sample(*networks, picture, inside, step, seed)
 
-                return fill_squares(rgb, hole, side, fill, part(progress, 0.05, 1.0), seed)
+                rest = part(progress, 0.05, 1.0)
+                return fill_squares(rgb, hole, Filler(side, fill), rest, seed)
 
             return ledger.SHARED.run(self._model(weights, codec), attempt)
         except ModelError as error:

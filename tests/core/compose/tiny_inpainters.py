@@ -13,7 +13,7 @@ from objectmorpher_core import models
 from objectmorpher_core.models.onnx_session import as_varint, bytes_field
 from tests.core.models.small_networks import floats, integer, integers, model, node
 
-FAMILIES = ("pixelhacker", "moebius", "lama", "migan")
+FAMILIES = ("pixelhacker", "moebius", "lama", "migan")  # one model each
 SIDE = 64  # px that the tiny networks see
 FLOAT, BYTE = 1, 2  # TensorProto's numbers of types
 TINY = {
