@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 from . import models
 from .base.progress import Progress, part, silent
-from .compose.plate import inpaint_pixelhacker
+from .compose.plate import inpaint_latent
 from .compose.refine import klein, qwen
 from .compose.refine.diffusion import DiffusionRefiner
-from .lift.trellis import lifter
+from .lift.trellis.lifter import TrellisLifter
+from .lift.triposplat.lifter import TripoSplatLifter
 from .models import HubModel, ModelError, ModelSet, depth_net, device
 from .models.device import Device
 from .models.fetch import SLACK
@@ -37,6 +38,7 @@ PIPELINES: Mapping[str, tuple[type[DiffusionRefiner], tuple[int, ...]]] = {
     "qwen-image-edit": (qwen.QwenRefiner, (20_430, 8_292, 127)),
     "flux2-klein": (klein.KleinRefiner, (3_876, 84)),
 }
+LIFTERS = {"trellis": TrellisLifter, "cupid": TrellisLifter, "triposplat": TripoSplatLifter}
 STEPS = 4  # of both, in how many the weights travel again where layers do
 
 
@@ -170,12 +172,12 @@ def need_of(model: HubModel) -> Needs | None:
     numbers = model.parameters * 1_000_000
     if model.family in sam_torch.WORK:
         return Need(numbers, sam_torch.WORK[model.family])
-    if model.family in ("trellis", "cupid"):
-        return lifter.need()
+    if model.family in LIFTERS:
+        return LIFTERS[model.family]().need()
     if model.family == "depth-anything":
         return Need(numbers, depth_net.WORK, numbers=("float32",))
-    if model.family == "pixelhacker":
-        return inpaint_pixelhacker.need(numbers)
+    if model.family in inpaint_latent.TITLES:
+        return inpaint_latent.need(numbers)
     if model.family not in PIPELINES:
         return None
     refiner, counts = PIPELINES[model.family]

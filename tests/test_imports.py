@@ -22,6 +22,9 @@ RESEARCH = ROOT / "research" / "objectmorpher_research"
 ONNX = CORE / "models" / "onnx_session.py"  # imports onnxruntime, with its telemetry off
 NETWORKS = {  # classes of PyTorch's; what is imported first needs none
     CORE / "lift" / "trellis",
+    CORE / "lift" / "triposplat",
+    CORE / "compose" / "plate" / "latent_diffusion.py",
+    CORE / "compose" / "plate" / "moebius.py",
     CORE / "compose" / "plate" / "pixelhacker.py",
 }
 WINDOW = {"imgui_bundle", "imgui", "glfw", "OpenGL"}

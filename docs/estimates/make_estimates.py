@@ -29,11 +29,12 @@ from published import (
 )
 
 from objectmorpher_core import models
-from objectmorpher_core.compose.plate import inpaint_pixelhacker
-from objectmorpher_core.compose.plate import pixelhacker as sampler
+from objectmorpher_core.compose.plate import inpaint_latent, latent_diffusion
 from objectmorpher_core.compose.refine import klein, qwen
 from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
 from objectmorpher_core.lift.trellis import lifter
+from objectmorpher_core.lift.triposplat import generator, networks
+from objectmorpher_core.lift.triposplat.lifter import FEWEST, TripoSplatLifter
 from objectmorpher_core.models import depth_net
 from objectmorpher_core.models.plans import RESIDENT, Need, Network, PipelineNeed, Way
 from objectmorpher_core.segment.sam import sam_torch
@@ -125,29 +126,55 @@ def _lifters() -> Iterator[Row]:
         given = normal(1, channels, 16, 16, 16), normal(1), normal(1, 1374, 1024)
         step = operations(build(flow), lambda m, given=given: m(*given))
         count = _count("dino") + sum(map(_count, parts))
-        need, work = lifter.need(), FORWARDS * step + LATENT + seen
-        for tier, memory in (
-            (f"`{name}`, an object; GPU, whole", need.bytes("float16")),
-            ("GPU, a part at a time", need.bytes("float16", RESIDENT)),
-        ):
-            yield Row(tier, count, memory, work, has_cpu=False)
-        yield Row("CPU", count, need.bytes("float32", RESIDENT), work, has_gpu=False)
+        need, work = lifter.TrellisLifter().need(), FORWARDS * step + LATENT + seen
+        yield from _lifter(name, count, need, work)
+    yield from _lifter("triposplat", *_triposplat())
     count, work = _count("depth"), operations(build("depth"), lambda m: m(_photo(518)))
     need = Need(count, depth_net.WORK)
     name = "`depth-anything-v2-small`, for the relief"
     yield Row(f"{name}; GPU or CPU", count, need.bytes("float32"), work)
 
 
+def _lifter(name: str, count: int, need: Need, work: float) -> Iterator[Row]:
+    for tier, memory in (
+        (f"`{name}`, an object; GPU, whole", need.bytes("float16")),
+        ("GPU, a part at a time", need.bytes("float16", RESIDENT)),
+    ):
+        yield Row(tier, count, memory, work, has_cpu=False)
+    yield Row("CPU", count, need.bytes("float32", RESIDENT), work, has_gpu=False)
+
+
+def _triposplat() -> tuple[int, Need, float]:
+    """Numbers in all, what they need, and the operations for as few Gaussians as can be."""
+    form, names = networks.FORM, ("dino3", "klein-vae", "triposplat-flow", "triposplat-decoder")
+    seen, drawn, flow, decoder = (build(name) for name in names)
+    points = FEWEST // form.per_point
+    latents, told = normal(1, form.tokens, form.channels), normal(1, 4101, form.seen + form.drawn)
+    packed = normal(1, form.tokens + 1, form.channels)
+    # Two forwards a step, with and without the picture; a level of the octree has eight times the
+    # cells of the one before, until each point has its own.
+    work = 2 * generator.SAMPLING.steps * operations(flow, lambda m: m(packed, normal(1), told))
+    work += operations(seen, lambda m: m(pixel_values=_photo(1024)))
+    work += operations(drawn, lambda m: m.encode(_photo(1024)))
+    work += operations(decoder, lambda m: m.gs(normal(1, points, 3), latents))
+    for level in range(networks.LEVELS):
+        cells = normal(1, min(8**level, points), 3)
+        work += operations(decoder, lambda m, cells=cells: m.octree(cells, 2, latents))
+    return sum(_count(name) for name in names), TripoSplatLifter().need(), work
+
+
 def _inpainters() -> Iterator[Row]:
-    unet, codec = build("pixelhacker"), build("pixelhacker-vae")
+    codec = build("pixelhacker-vae")
     ids = torch.zeros(2, 10, dtype=torch.long, device="meta")
-    step = operations(unet, lambda m: m(normal(2, 9, 64, 64), normal(2), ids))
-    work = (sampler.STEPS - 1) * step
-    work += operations(codec, lambda m: (m.encode(_photo(512)), m.decode(normal(1, 4, 64, 64))))
-    count = parameters(unet) + parameters(codec)
-    need = inpaint_pixelhacker.need(count)
-    yield Row("`pixelhacker`, a square; float32", count, need.bytes("float32"), work)
-    yield Row("GPU, bfloat16", count, need.bytes("bfloat16"), work, has_cpu=False)
+    drawn = operations(codec, lambda m: (m.encode(_photo(512)), m.decode(normal(1, 4, 64, 64))))
+    for name in ("pixelhacker", "moebius"):
+        unet = build(name)
+        step = operations(unet, lambda m: m(normal(2, 9, 64, 64), normal(2), ids))
+        work = (latent_diffusion.STEPS - 1) * step + drawn
+        count = parameters(unet) + parameters(codec)
+        need = inpaint_latent.need(count)
+        yield Row(f"`{name}`, a square; float32", count, need.bytes("float32"), work)
+        yield Row("GPU, bfloat16", count, need.bytes("bfloat16"), work, has_cpu=False)
     for name in ("lama", "migan"):
         yield _of_file(name, models.hub_model(name).size)
 

@@ -31,7 +31,7 @@ from published import SAM, SAM2, build, parameters, trellis_parts
 from torch import Tensor
 
 from objectmorpher_core.base.progress import silent
-from objectmorpher_core.compose.plate import pixelhacker
+from objectmorpher_core.compose.plate import latent_diffusion
 from objectmorpher_core.compose.refine import klein
 from objectmorpher_core.lift.trellis.configs import Sampling
 from objectmorpher_core.lift.trellis.generator import sample
@@ -241,7 +241,7 @@ def _shell(device: str) -> Voxels:
 def _pixelhacker_step(device: str, number: torch.dtype) -> Job:
     """Both the step with what is asked for and the one without, as they are run: together."""
     network: Any = build("pixelhacker", device).to(number)
-    ids = torch.arange(pixelhacker.IDS, device=device).view(2, -1)
+    ids = torch.arange(latent_diffusion.IDS, device=device).view(2, -1)
     latents = torch.randn(2, 9, 64, 64, device=device, dtype=number)
     time_now = torch.tensor(1, device=device)
     return Job(lambda: network(latents, time_now, ids), "a step of 20, 512 px", parameters(network))
@@ -254,8 +254,9 @@ def _pixelhacker(device: str, number: torch.dtype) -> Job:
     hole = np.zeros((512, 512), bool)
     hole[128:384, 128:384] = True
     return Job(
-        lambda: pixelhacker.sample(network, codec, picture, hole, silent, 0),
-        f"a fill of {pixelhacker.STEPS} steps, 512 px", parameters(network) + parameters(codec),
+        lambda: latent_diffusion.sample(network, codec, picture, hole, silent, 0),
+        f"a fill of {latent_diffusion.STEPS} steps, 512 px",
+        parameters(network) + parameters(codec),
     )  # fmt: skip
 
 

@@ -13,9 +13,12 @@ import transformers
 from torch import Tensor, nn
 from torch.utils.flop_counter import FlopCounterMode
 
-from objectmorpher_core.compose.plate.pixelhacker import PUBLISHED
-from objectmorpher_core.compose.plate.pixelhacker import build as build_pixelhacker
+from objectmorpher_core.compose.plate.latent_diffusion import build as build_latent
+from objectmorpher_core.compose.plate.moebius import Moebius
+from objectmorpher_core.compose.plate.pixelhacker import PixelHacker
 from objectmorpher_core.lift.trellis.parts import build as build_part
+from objectmorpher_core.lift.triposplat.generator import DINO_FORM
+from objectmorpher_core.lift.triposplat.networks import FORM, Decoder, Flow
 
 d: Any = diffusers  # whose names are lazy
 t: Any = transformers
@@ -126,7 +129,11 @@ def _networks() -> dict[str, Callable[[], nn.Module]]:
         "sam3": lambda: t.Sam3TrackerModel(t.Sam3TrackerConfig()),
         "dino": lambda: t.Dinov2WithRegistersModel(t.Dinov2WithRegistersConfig(**DINO)),
         "depth": _depth,
-        "pixelhacker": lambda: build_pixelhacker(PUBLISHED),
+        "dino3": lambda: t.DINOv3ViTModel(t.DINOv3ViTConfig(**DINO_FORM)),
+        "triposplat-flow": lambda: Flow(FORM),
+        "triposplat-decoder": lambda: Decoder(FORM),
+        "pixelhacker": lambda: build_latent(PixelHacker),
+        "moebius": lambda: build_latent(Moebius),
         "pixelhacker-vae": _codec,
         "qwen": d.QwenImageTransformer2DModel,
         "qwen-vae": d.AutoencoderKLQwenImage,

@@ -30,7 +30,8 @@ class Inpainter(Protocol):
     def inpaint(self, rgb: Pixels, hole: Mask, progress: Progress, seed: int = 0) -> Pixels:
         """`rgb` (h, w, 3) u8 or u16 with its `hole` (h, w) filled, the same values elsewhere.
 
-        The same arguments give the same bytes. Raises InpaintError where the hole is everything.
+        What the hole hides does not matter, but to `klein`, which is shown what is to go. The same
+        arguments give the same bytes. Raises InpaintError where the hole is everything.
         """
         ...
 
@@ -68,7 +69,9 @@ REFINERS: tuple[str, ...] = (
 )  # what is done to a moved object so that it fits in
 
 BACKENDS = {  # best first; the last one is always there
-    "pixelhacker": "objectmorpher_core.compose.plate.inpaint_pixelhacker:PixelHackerInpainter",
+    "pixelhacker": "objectmorpher_core.compose.plate.inpaint_latent:pixelhacker",
+    "moebius": "objectmorpher_core.compose.plate.inpaint_latent:moebius",
+    "klein": "objectmorpher_core.compose.plate.inpaint_klein:KleinInpainter",
     "lama": "objectmorpher_core.compose.plate.inpaint_onnx:lama",
     "migan": "objectmorpher_core.compose.plate.inpaint_onnx:migan",
     "patchmatch": "objectmorpher_core.compose.plate.inpaint_patchmatch:PatchMatchInpainter",

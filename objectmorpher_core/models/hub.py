@@ -25,13 +25,13 @@ from .fetch import SLACK, check_online, folder, run_watched, sha256_of
 from .registry import HubModel, ModelError, families, hub_model, hub_models
 from .tensors_only import convert
 from .weight_folder import (
+    LATENT,
     PICKLED,
-    PIXELHACKER,
     PLAIN,
     check_file,
     check_files,
     check_folder,
-    pickled_pixelhacker,
+    pickled_latent,
 )
 
 log = logging.getLogger(__name__)
@@ -155,9 +155,9 @@ def convert_folder(id: str, at: Path, progress: Progress = silent) -> HubState:
     They are written into our models folder; nothing in the user's changes. Raises ModelError.
     """
     model, at = hub_model(id), at.expanduser().absolute()
-    if model.family != PIXELHACKER:
+    if model.family not in LATENT:
         raise ModelError(f"{id} is not published as pickles: add it without converting")
-    wanted = pickled_pixelhacker(at)
+    wanted = pickled_latent(model.family, at)
     partial, place = folder() / (PARTIAL + id), folder() / id
     try:
         needed = sum(source.stat().st_size for source in wanted.values()) + SLACK

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..base.limits import WEIGHTS_HEADER as MOST_HEADER
 from ..base.quoting import named, shown
-from .registry import ModelError
+from .registry import ModelError, hub_models
 
 CONFIG = "config.json"
 PIPELINE = "pipeline.json"
@@ -23,9 +23,11 @@ QUANTISED = ".gguf"  # a pipeline's transformer in few bits; numbers only, too
 PICKLED = (".bin", ".pt", ".pth", ".ckpt", ".pkl", ".pickle")
 ONNX = "-onnx"  # ending of the families that are ONNX files
 ONE_GRAPH = ("lama", "migan", "depth-graph")  # families that are one ONNX file
-PIXELHACKER = "pixelhacker"  # a network, perhaps in a folder of its own, and an autoencoder
-CODEC = "vae"  # its folder
+CODEC = "vae"  # folder of an autoencoder
+# Families of a network, perhaps in a folder of its own, and an autoencoder -> which must be there.
+LATENT = {"pixelhacker": ("network", CODEC), "moebius": ("network",), "pixelhacker-vae": (CODEC,)}
 NETWORK = "diffusion_pytorch_model"  # what diffusers calls its files
+TRIPOSPLAT = "triposplat"  # its files are named in the registry
 INDEX = "model_index.json"
 ADAPTER = ("-lora", "-lightning")  # endings of the families that are one file beside a model
 # Networks of a pipeline that must be there; diffusers' names.
@@ -44,8 +46,13 @@ def check_folder(family: str, at: Path) -> tuple[str, ...]:
     if family in PIPELINES:
         return _check_pipeline(family, at)
     names = sorted(path.name for path in at.iterdir() if path.is_file())
-    if family == PIXELHACKER:
-        return _pixelhacker(at, names)
+    if family in LATENT:
+        return _latent(family, at, names)
+    if family == TRIPOSPLAT:
+        files = next(model.files for model in hub_models() if model.family == family)
+        for name in files:
+            check_safetensors(at / name)
+        return files
     if family in ONE_GRAPH:
         graphs = tuple(name for name in names if name.endswith(GRAPH))
         if len(graphs) != 1:
@@ -87,21 +94,24 @@ def check_files(family: str, at: Path) -> None:
         check_folder(family, at)
 
 
-def pickled_pixelhacker(at: Path) -> dict[str, Path]:
-    """Find PixelHacker in a folder as published: names in a folder of ours, and files to take.
+def pickled_latent(family: str, at: Path) -> dict[str, Path]:
+    """Find one of `LATENT` in a folder as published: names in a folder of ours, and files to take.
 
     The fine-tuning that is used is Places2's, of scenes, if it is there. Raises ModelError.
     """
     folders = [at / name for name in ("ft_places2", ".", "pretrained")]
     own = [f for f in folders if _of_name(f, (PICKLED[0], PLAIN))]
-    codec = _of_name(at / CODEC, (PLAIN, PICKLED[0]))
-    if not own or not codec or not (at / CODEC / CONFIG).is_file():
+    codec = _of_name(at / CODEC, (PLAIN, PICKLED[0])) if (at / CODEC / CONFIG).is_file() else []
+    if ("network" in LATENT[family] and not own) or (CODEC in LATENT[family] and not codec):
         raise ModelError(f"{at.name} lacks {NETWORK}{PICKLED[0]}, or {CODEC} with its {CONFIG}")
-    found = {NETWORK + PLAIN: own[0] / _of_name(own[0], (PLAIN, PICKLED[0]))[0]}
-    found[f"{CODEC}/{NETWORK}{PLAIN}"] = at / CODEC / codec[0]
-    found[f"{CODEC}/{CONFIG}"] = at / CODEC / CONFIG
-    if (own[0] / CONFIG).is_file():
-        found[CONFIG] = own[0] / CONFIG
+    found = {}
+    if own:
+        found[NETWORK + PLAIN] = own[0] / _of_name(own[0], (PLAIN, PICKLED[0]))[0]
+        if (own[0] / CONFIG).is_file():
+            found[CONFIG] = own[0] / CONFIG
+    if codec:
+        found[f"{CODEC}/{NETWORK}{PLAIN}"] = at / CODEC / codec[0]
+        found[f"{CODEC}/{CONFIG}"] = at / CODEC / CONFIG
     return found
 
 
@@ -109,26 +119,30 @@ def _of_name(at: Path, endings: tuple[str, ...]) -> list[str]:
     return [NETWORK + end for end in endings if (at / (NETWORK + end)).is_file()]
 
 
-def _pixelhacker(at: Path, names: list[str]) -> tuple[str, ...]:
+def _latent(family: str, at: Path, names: list[str]) -> tuple[str, ...]:
     """See `check_folder`."""
-    found = [f"{CODEC}/{NETWORK}{PLAIN}", f"{CODEC}/{CONFIG}"]
+    codec = [f"{CODEC}/{NETWORK}{PLAIN}", f"{CODEC}/{CONFIG}"]
     own = [n for n in names if n.endswith(PLAIN)]
     below = sorted(p for p in at.glob(f"*/*{PLAIN}") if p.parent.name != CODEC)
     own += [p.relative_to(at).as_posix() for p in below]
-    if not own and (any(at.glob(f"*{PICKLED[0]}")) or any(at.glob(f"*/*{PICKLED[0]}"))):
+    absent = [name for name in codec if not (at / name).is_file()]
+    lacks = [("network", not own), (CODEC, bool(absent))]
+    is_short = any(is_absent and part in LATENT[family] for part, is_absent in lacks)
+    if is_short and any(at.glob(f"*{PICKLED[0]}")) | any(at.glob(f"*/*{PICKLED[0]}")):
         raise ModelError(
             f"{at.name} holds only pickled weights, which can run any code: to take nothing but"
-            f" their numbers, objectmorpher models add {PIXELHACKER} FOLDER --convert"
+            f" their numbers, objectmorpher models add {family} FOLDER --convert"
         )
-    if len(own) != 1:
+    if "network" in LATENT[family] and len(own) != 1:
         raise ModelError(f"{at.name} holds {len(own)} {PLAIN} files beside {CODEC}, not one")
+    if CODEC in LATENT[family] and absent:
+        raise ModelError(f"{at.name} lacks {absent[0]}")
+    found = [*own, *([] if absent else codec)]
     for name in found:
-        if not (at / name).is_file():
-            raise ModelError(f"{at.name} lacks {name}")
-    config = Path(own[0]).with_name(CONFIG).as_posix()
-    for name in (own[0], found[0]):
-        check_safetensors(at / name)
-    return (own[0], *found, *([config] if (at / config).is_file() else []))
+        if name.endswith(PLAIN):
+            check_safetensors(at / name)
+    configs = [Path(name).with_name(CONFIG).as_posix() for name in own]
+    return (*found, *(name for name in configs if (at / name).is_file()))
 
 
 def _check_diffusers(family: str, at: Path) -> tuple[str, ...]:

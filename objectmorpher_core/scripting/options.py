@@ -264,11 +264,12 @@ class EditScript:
     )  # fmt: skip
     inpaint: str = _option(
         "auto", TEXT, (PHOTO, BACKENDS), "NAME",
-        "auto, pixelhacker, lama, migan, patchmatch or telea",
+        "auto, pixelhacker, moebius, klein, lama, migan, patchmatch or telea",
     )  # fmt: skip
     lift: str = _option(
-        "auto", TEXT, (SHAPE, BACKENDS), "NAME", "auto, relief, trellis, cupid, or a worker"
-    )
+        "auto", TEXT, (SHAPE, BACKENDS), "NAME",
+        "auto, relief, trellis, cupid, triposplat, or a worker",
+    )  # fmt: skip
     fill_from: tuple[FillFrom, ...] = _option(
         (), SOURCES, (OTHER, BACKENDS), "X,Y:X2,Y2[,R]",
         "fill the background within R px of X2,Y2 from around X,Y",

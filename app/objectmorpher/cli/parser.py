@@ -322,7 +322,7 @@ def _add_models(parser: argparse.ArgumentParser) -> None:
     )
     add("--accept-licence", metavar="NAME", help="needed for models with a star in the list")
     add("--convert", dest="is_converted", action="store_true",
-        help="for add pixelhacker: extract the weights from its pickle files")  # fmt: skip
+        help="for add pixelhacker, moebius: extract the weights from pickle files")  # fmt: skip
     add("--offline", dest="is_offline", action="store_true",
         help="download nothing; also by OBJECTMORPHER_OFFLINE=1")  # fmt: skip
     add = parser.add_argument_group("setup").add_argument

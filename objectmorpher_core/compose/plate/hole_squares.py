@@ -28,8 +28,17 @@ FINER = 1.02  # x what the network saw: with less there is no detail to be conti
 Fill = Callable[[F32, Mask, Progress, int], F32]
 """fill(picture (n, n, 3) in [0, 1], hole (n, n), progress, seed) -> (n, n, 3), filled.
 
-In the hole the picture is a smooth guess.
+In the hole the picture is a smooth guess, unless the network is to see what stands there.
 """
+
+
+@dataclass(frozen=True)
+class Filler:
+    """A network."""
+
+    side: int  # px of the square that it sees
+    fill: Fill
+    sees_all: bool = False  # also what stands in the hole
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +68,9 @@ def squares(hole: Mask, side: int) -> tuple[Square, ...]:
 
 
 def fill_squares(
-    rgb: Pixels, hole: Mask, side: int, fill: Fill, progress: Progress = silent, seed: int = 0
+    rgb: Pixels, hole: Mask, filler: Filler, progress: Progress = silent, seed: int = 0
 ) -> Pixels:
-    """`rgb` (H, W, 3) with its hole filled by a network that sees (side, side).
+    """`rgb` (H, W, 3) with its hole filled by a network that sees squares.
 
     Raises InpaintError where the hole is everything; the same bytes outside.
     """
@@ -71,13 +80,14 @@ def fill_squares(
     if not hole.any():
         return filled
     progress(0.0, "Filling the background")
-    found = squares(hole, side)
+    found = squares(hole, filler.side)
     for k, square in enumerate(found):
         step = part(progress, k / len(found), (k + 1) / len(found))
         x0, y0, x1, y1 = square.box
         window = slice(y0, y1), slice(x0, x1)
         # Of other holes in it, those that are filled count as known.
-        new = _filled(filled[window], rest[window], side, fill, step, seed)
+        shown = rgb[window] if filler.sees_all else None
+        new = _filled(filled[window], rest[window], shown, filler, step, seed)
         np.copyto(filled[window], new, where=square.own[..., None])
         rest[window] &= ~square.own
     progress(1.0, "Filled the background")
@@ -101,12 +111,12 @@ def _box(own: Mask, side: int) -> tuple[int, int, int, int]:
 
 
 def _filled(
-    crop: Pixels, hole: Mask, side: int, fill: Fill, progress: Progress, seed: int
+    crop: Pixels, hole: Mask, shown: Pixels | None, filler: Filler, progress: Progress, seed: int
 ) -> Pixels:
-    """A crop (h, w, 3), its whole hole filled."""
+    """A crop (h, w, 3), its whole hole filled; `shown`: the same with what stands there."""
     if hole.all():  # other holes have left nothing of it
         raise InpaintError("nothing around the hole is known: there is nothing to fill it from")
-    height, width = hole.shape
+    (height, width), side = hole.shape, filler.side
     longer = max(height, width)
     above, before = (longer - height) // 2, (longer - width) // 2
     rims = (above, longer - height - above), (before, longer - width - before)
@@ -120,7 +130,10 @@ def _filled(
         is_known = share >= share.max()
     mean = np.asarray(seen / np.maximum(share, 1e-6)[..., None] * is_known[..., None], np.float32)
     guess = np.clip(smooth(mean, is_known.astype(np.float32)), 0, 1).astype(np.float32)
-    answer = fill(guess, ~is_known, part(progress, 0.0, 0.9), seed)
+    if shown is not None:
+        whole = np.pad(unit_pixels(shown), (*rims, (0, 0)), mode="symmetric")
+        guess = np.clip(_resized(whole, side), 0, 1)
+    answer = filler.fill(guess, ~is_known, part(progress, 0.0, 0.9), seed)
     progress(0.9, "Copying the details")
     if longer <= FINER * side:
         whole = _resized(answer, longer)[above : above + height, before : before + width]

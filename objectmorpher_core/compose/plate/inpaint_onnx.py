@@ -21,7 +21,7 @@ from ...base.progress import Progress
 from ...models import ModelError
 from ...models.onnx_session import open_session
 from .. import InpaintError
-from .hole_squares import fill_squares
+from .hole_squares import Filler, fill_squares
 
 SIDE = 512  # px that both were trained with, where a file does not say
 BYTES = 16.0  # x the picture's brightness; what comes out brighter is in [0, 255]
@@ -54,7 +54,7 @@ class OnnxInpainter:
             if not found:
                 raise ModelError(self.missing() or f"{self.name} vanished")
             network = OnnxNetwork(found[0], self.name)
-            return fill_squares(rgb, hole, network.side, network.fill, progress)
+            return fill_squares(rgb, hole, Filler(network.side, network.fill), progress)
         except ModelError as error:
             raise InpaintError(str(error)) from error
 

@@ -144,6 +144,7 @@ class DiffusionRefiner:
     """A refiner whose pipeline stays open as long as the ledger has room for it."""
 
     name: str
+    doing = "Refining"
     families: tuple[str, ...]  # of models.registry, the best first
     adapters: str  # family of the LoRA that was trained for this job
     pipeline: str  # diffusers' class
@@ -195,7 +196,7 @@ class DiffusionRefiner:
         return need_of(self.folder(), self.work, self.parts, adapters)
 
     def _model(self) -> ledger.Model[Any]:
-        made_of = (self.name, self.folder(), stamp(self.folder()), self._sources())
+        made_of = (self.pipeline, self.folder(), stamp(self.folder()), self._sources())
         return ledger.Model("the refiner", made_of, self.need(), self._open)
 
     def _call(self, pipeline: Any, pictures: list[Any], given: dict[str, Any]) -> Any:
@@ -272,10 +273,10 @@ class DiffusionRefiner:
         steps = self._steps()
 
         def tell(_: Any, step: int, __: Any, tensors: dict[str, Any]) -> dict[str, Any]:
-            progress(0.1 + 0.85 * (step + 1) / steps, f"Refining, step {step + 1} of {steps}")
+            progress(0.1 + 0.85 * (step + 1) / steps, f"{self.doing}, step {step + 1} of {steps}")
             return tensors
 
-        progress(0.1, "Refining")
+        progress(0.1, self.doing)
         height, width = shown[0].shape[:2]
         given = {
             "height": height, "width": width, "num_inference_steps": steps, "output_type": "np",

@@ -1,4 +1,4 @@
-"""FLUX.2-klein-4B: four steps, and no text encoder, because the instruction is always the same.
+"""FLUX.2-klein-4B: four steps, and no text encoder, because an instruction is always the same.
 
 What the text encoder says of the instruction is computed once and kept in the models folder. From
 then on the encoder, half of the pipeline, is neither loaded nor needed.
@@ -15,13 +15,14 @@ from ... import models
 from ...models import ModelError, device
 from ...models.weight_folder import check_safetensors
 from . import diffusion
-from .diffusion import INSTRUCTION, DiffusionRefiner, Size
+from .diffusion import INSTRUCTION, DiffusionRefiner, Size, adapter_files
 
 STEPS = 4
 MULTIPLE = 16  # px of the sides of what the network is shown
 LEAST = 64  # px of its shorter side
 LONGEST = 8  # x the shorter side
 KEY = "prompt_embeds"
+ADAPTERS = {"klein": "klein-refine-lora", "removal": "klein-remove-lora"}  # name -> family
 
 
 class KleinRefiner(DiffusionRefiner):
@@ -29,7 +30,9 @@ class KleinRefiner(DiffusionRefiner):
 
     name = "klein"
     families = ("flux2-klein",)
-    adapters = "klein-refine-lora"
+    adapters = ADAPTERS[name]
+    adapter, strength = name, 1.0  # of all adapters, the one that is used
+    instruction = INSTRUCTION
     pipeline = "Flux2KleinPipeline"
     transformer = "Flux2Transformer2DModel"
     parts = ("transformer",)
@@ -41,7 +44,7 @@ class KleinRefiner(DiffusionRefiner):
         sentence = super().missing()
         if sentence is not None:
             return sentence
-        folder, kept = self.folder(), prompt_file(self.folder())
+        folder, kept = self.folder(), prompt_file(self.folder(), self.instruction)
         if kept.exists() or (folder / "text_encoder").is_dir():
             return None
         return (
@@ -58,10 +61,14 @@ class KleinRefiner(DiffusionRefiner):
     def _steps(self) -> int:
         return STEPS
 
+    def _sources(self) -> tuple[tuple[str, Path], ...]:
+        """Those of both uses: one pipeline is opened for them."""
+        return adapter_files(*ADAPTERS.items())
+
     def _load(self, folder: Path, options: dict[str, Any]) -> Any:
         from diffusers.pipelines.flux2.pipeline_flux2_klein import Flux2KleinPipeline
 
-        prompt_of(folder)
+        prompt_of(folder, self.instruction)
         return Flux2KleinPipeline.from_pretrained(
             folder, text_encoder=None, tokenizer=None, **options
         )
@@ -69,27 +76,33 @@ class KleinRefiner(DiffusionRefiner):
     def _call(self, pipeline: Any, pictures: list[Any], given: dict[str, Any]) -> Any:
         from safetensors.torch import load_file
 
-        file = prompt_of(self.folder())
+        names = [name for name, _ in self._sources()]
+        if self.adapter in names:
+            pipeline.enable_lora()
+            pipeline.set_adapters([self.adapter], [self.strength])
+        elif names:
+            pipeline.disable_lora()
+        file = prompt_of(self.folder(), self.instruction)
         check_safetensors(file)
         embedding = load_file(file)[KEY].to(pipeline._execution_device, pipeline.transformer.dtype)
         return pipeline(image=pictures, prompt_embeds=embedding, guidance_scale=1.0, **given)
 
 
-def prompt_file(folder: Path) -> Path:
+def prompt_file(folder: Path, instruction: str = INSTRUCTION) -> Path:
     """Return the file of the instruction's embedding, which depends on instruction and model."""
     config = folder / "text_encoder" / "config.json"
     kind = config.read_bytes() if config.exists() else folder.name.encode()
-    told = hashlib.sha256(INSTRUCTION.encode() + kind).hexdigest()[:12]
+    told = hashlib.sha256(instruction.encode() + kind).hexdigest()[:12]
     return models.folder() / f"klein-prompt-{told}.safetensors"
 
 
-def prompt_of(folder: Path) -> Path:
+def prompt_of(folder: Path, instruction: str = INSTRUCTION) -> Path:
     """That file, made where it is not there. Raises ModelError."""
-    file = prompt_file(folder)
-    return file if file.exists() else encode_instruction(folder)
+    file = prompt_file(folder, instruction)
+    return file if file.exists() else encode_instruction(folder, instruction)
 
 
-def encode_instruction(folder: Path) -> Path:
+def encode_instruction(folder: Path, instruction: str = INSTRUCTION) -> Path:
     """Runs the text encoder of a pipeline's folder once; the file that keeps its answer.
 
     On the CPU: it takes seconds, and the GPU may be too small for it. Raises ModelError.
@@ -111,11 +124,11 @@ def encode_instruction(folder: Path) -> Path:
         layers = layers_told(int(encoder.config.num_hidden_layers))
         with torch.inference_mode():
             embedding = Flux2KleinPipeline._get_qwen3_prompt_embeds(
-                encoder, tokenizer, INSTRUCTION, hidden_states_layers=list(layers)
+                encoder, tokenizer, instruction, hidden_states_layers=list(layers)
             )
         data = save({KEY: embedding.contiguous()})
         models.folder().mkdir(parents=True, exist_ok=True)
-        write_all({prompt_file(folder): data})
+        write_all({prompt_file(folder, instruction): data})
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ModelError(f"{folder.name}'s text encoder cannot be opened: {error}") from error
     except RuntimeError as error:
@@ -124,7 +137,7 @@ def encode_instruction(folder: Path) -> Path:
         raise ModelError(f"{folder.name}'s text encoder does not fit its configuration") from error
     del encoder
     gc.collect()
-    return prompt_file(folder)
+    return prompt_file(folder, instruction)
 
 
 def layers_told(count: int) -> tuple[int, int, int]:

@@ -7,7 +7,7 @@ A batch has the same cells in each of its items, so cells of a sparse grid are p
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
@@ -214,15 +214,25 @@ class TimeCode(nn.Module):
         )
 
     def forward(self, time: Tensor) -> Tensor:
-        waves = time.float()[:, None] * _rates(TIME_CODE // 2, time.device)
-        return self.mlp(torch.cat([waves.cos(), waves.sin()], 1))
+        waves = time.float()[:, None] * self.rates(TIME_CODE // 2, time.device)
+        code = torch.cat([waves.cos(), waves.sin()], 1)
+        return self.mlp(code.to(next(self.parameters()).dtype))
+
+    def rates(self, count: int, device: torch.device) -> Tensor:
+        """(count,) radians per thousandth."""
+        return _rates(count, device)
 
 
 def place_code(cells: Tensor, channels: int) -> Tensor:
     """(N, channels) waves along each axis, for cells (N, 3); 0 in channels that are left over."""
-    waves = cells.float()[:, :, None] * _rates(channels // 6, cells.device)
-    code = torch.cat([waves.sin(), waves.cos()], 2).flatten(1)
-    return functional.pad(code, (0, channels - code.shape[1]))
+    return wave_code(cells.float(), _rates(channels // 6, cells.device), channels)
+
+
+def wave_code(points: Tensor, rates: Tensor, channels: int) -> Tensor:
+    """(..., channels) waves of the given rates (R,) along each axis of points (..., 3)."""
+    waves = points[..., None] * rates
+    code = torch.cat([waves.sin(), waves.cos()], -1).flatten(-2)
+    return functional.pad(code, (0, channels - code.shape[-1]))
 
 
 def _rates(count: int, device: torch.device) -> Tensor:
@@ -286,7 +296,7 @@ class GaussianDecoder(Windowed):
         count = form.representation_config.num_gaussians
         super().__init__(form, form.latent_channels, count * sum(QUANTITIES.values()))
         self.activations = form.representation_config
-        start = torch.from_numpy(_even_points(count)) * 2 - 1
+        start = torch.from_numpy(even_points(count)) * 2 - 1
         self.register_buffer(
             "offset_perturbation", torch.atanh(start / self.activations.voxel_size)
         )
@@ -294,22 +304,32 @@ class GaussianDecoder(Windowed):
     def gaussians(self, raw: Tensor, voxels: Voxels) -> Gaussians:
         """Return the Gaussians of an output (N, D), in the unit cube around the origin, z up."""
         how = self.activations
-        sizes = [width * how.num_gaussians for width in QUANTITIES.values()]
-        parts = zip(QUANTITIES, raw.float().split(sizes, dim=1), strict=True)
-        said = {
-            name: how.lr[name] * part.unflatten(1, (how.num_gaussians, QUANTITIES[name]))
-            for name, part in parts
-        }
+        said = quantities(raw, how, QUANTITIES)
         offsets = said["_xyz"] + (self.offset_perturbation if how.perturb_offset else 0.0)
         within = torch.tanh(offsets) * (0.5 * how.voxel_size)
         means = (voxels.cells[:, None] + 0.5 + within) / voxels.resolution - 0.5
-        upright = said["_rotation"] + torch.eye(4, device=raw.device)[0]
-        opacities = said["_opacity"][..., 0] + math.log(how.opacity_bias / (1 - how.opacity_bias))
-        arrays = (
-            means, functional.normalize(upright, dim=-1), _scales(said["_scaling"], how),
-            torch.sigmoid(opacities), (0.5 + SH_C0 * said["_features_dc"]).clamp(0, 1),
-        )  # fmt: skip
-        return Gaussians(*(a.flatten(0, 1).cpu().numpy() for a in arrays))
+        return as_gaussians(said, means, how)
+
+
+def quantities(raw: Tensor, how: Activations, widths: Mapping[str, int]) -> dict[str, Tensor]:
+    """Name -> (N, G, width) of an output (N, D) for G Gaussians at each of N places."""
+    sizes = [width * how.num_gaussians for width in widths.values()]
+    parts = zip(widths.items(), raw.float().split(sizes, dim=1), strict=True)
+    return {
+        name: how.lr.get(name, 1.0) * part.unflatten(1, (how.num_gaussians, width))
+        for (name, width), part in parts
+    }
+
+
+def as_gaussians(said: Mapping[str, Tensor], means: Tensor, how: Activations) -> Gaussians:
+    """The Gaussians of `quantities` at means (N, G, 3). Raises ValueError: not finite."""
+    upright = said["_rotation"] + torch.eye(4, device=means.device)[0]
+    opacities = said["_opacity"][..., 0] + math.log(how.opacity_bias / (1 - how.opacity_bias))
+    arrays = (
+        means, functional.normalize(upright, dim=-1), _scales(said["_scaling"], how),
+        torch.sigmoid(opacities), (0.5 + SH_C0 * said["_features_dc"]).clamp(0, 1),
+    )  # fmt: skip
+    return Gaussians(*(a.flatten(0, 1).cpu().numpy() for a in arrays))
 
 
 def _scales(said: Tensor, how: Activations) -> Tensor:
@@ -321,7 +341,7 @@ def _scales(said: Tensor, how: Activations) -> Tensor:
     return torch.sqrt(own * own + how.filter_kernel_size**2)
 
 
-def _even_points(count: int) -> np.ndarray:
+def even_points(count: int) -> np.ndarray:
     """Hammersley's points (count, 3) f32 in the unit cube."""
     points = np.empty((count, 3))
     points[:, 0] = np.arange(count) / count

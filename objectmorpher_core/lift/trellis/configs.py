@@ -260,7 +260,8 @@ def part_path(folder: Path, where: str, shared: Path | None = None) -> Path:
 # Where the weights lie, and what to get when they do not.
 
 TRELLIS, CUPID = "trellis-image-large", "cupid"
-ENCODER = "dinov2-with-registers-large"
+ENCODER, TRIPOSPLAT = "dinov2-with-registers-large", "triposplat"
+MARKS = {ENCODER: "config.json", TRIPOSPLAT: "vae/flux2-vae.safetensors"}  # else pipeline.json
 PACKAGES = ("torch", "transformers", "safetensors")
 
 
@@ -281,7 +282,7 @@ def missing(*ids: str) -> str | None:
         if state.state == "damaged":
             return f"{id} is damaged ({state.reason}): objectmorpher models get {id}"
         where = weights_folder(id)
-        if not (where / ("config.json" if id == ENCODER else "pipeline.json")).exists():
+        if not (where / MARKS.get(id, "pipeline.json")).exists():
             own = f"or objectmorpher models add {state.model.family} FOLDER"
             size = f"{state.model.size / 1e9:.1f} GB, {state.model.licence}"
             return f"{id} is not there: objectmorpher models get {id} ({size}), {own}"

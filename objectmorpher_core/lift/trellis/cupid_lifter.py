@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ...base.arrays import F64
 from ...base.camera import Camera
 from ...base.progress import Progress
 from ...document.gaussians import Gaussians
+from ...document.model import LiftSettings
 from ...splat_files.splats.ply import QUARTER_TURN, turned
 from .. import LiftSubject
 from ..registration.placement import Hints
@@ -18,35 +20,34 @@ from .picture import ConditionPicture
 
 if TYPE_CHECKING:
     from ...models.plans import Plan
-    from .generator import Folders, Generator
 
 
 class CupidLifter(TrellisLifter):
     """Image to 3D that stands where the photo shows it."""
 
-    name = "cupid"
+    name, title = "cupid", "CUPID"
     ids = (configs.CUPID, configs.ENCODER, configs.TRELLIS)
 
-    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
+    def _new_generator(self, folders: tuple[Path, ...], plan: Plan) -> Any:
         from .cupid import CupidGenerator
+        from .generator import Folders
 
-        return CupidGenerator(folders, plan)
+        return CupidGenerator(Folders(*folders), plan)
 
     def stance(self, subject: LiftSubject, progress: Progress, seed: int = 0) -> F64 | None:
         """(4, 4) world from the network's own frame of the object; None where no camera sees it so.
 
         The frame is about the same for two pictures of one object. Raises LiftError.
         """
-        from .picture import ConditionPicture
-
         picture = ConditionPicture.of(subject.matte)
         made = self.make(lambda generator: generator.make(picture, progress, seed))
         assert made.view is not None
         return pose_seen(made.view, picture, subject.camera)
 
     def _made(
-        self, picture: ConditionPicture, subject: LiftSubject, progress: Progress, seed: int
+        self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
+        picture = ConditionPicture.of(subject.matte)
         made = self.make(lambda generator: generator.make(picture, progress, seed))
         assert made.view is not None
         start = pose_seen(made.view, picture, subject.camera)

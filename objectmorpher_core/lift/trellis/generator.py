@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -25,6 +25,7 @@ from .picture import ConditionPicture, Encoder
 from .voxels import Voxels
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
 CELLS = 1 << 16  # more are never decoded; the networks were trained with half as many at most
 FLOW, STRUCTURE = "sparse_structure_flow_model", "sparse_structure_decoder"
 LATENT, DECODER = "slat_flow_model", "slat_decoder_gs"
@@ -62,14 +63,44 @@ class Extras:
     hidden: Tensor  # of the step without the picture
 
 
-class Generator:
+class InParts:
+    """A model of several networks; only where the plan keeps them is more than one in memory."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self._parts: dict[str, Any] = {}
+
+    @property
+    def device(self) -> torch.device:
+        return torch.device(self.plan.device)
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """Return the precision of transformers and convolutions."""
+        return getattr(torch, self.plan.number)
+
+    def held(self, role: str, load: Callable[[], T]) -> T:
+        """The network of a role, in memory; without `plan.keeps` it replaces the one before."""
+        if role not in self._parts:
+            if not self.plan.keeps:
+                self.release()
+            self._parts[role] = load()
+        return self._parts[role]
+
+    def release(self) -> None:
+        """Gives the memory of all parts back."""
+        self._parts.clear()
+        empty_cache(self.plan.device)
+
+
+class Generator(InParts):
     """TRELLIS. Reads its description at once, and each part's weights when they are needed."""
 
     def __init__(self, folders: Folders, plan: Plan) -> None:
         """Raises LiftError where the folders do not hold what they should."""
-        self.folders, self.plan = folders, plan
+        super().__init__(plan)
+        self.folders = folders
         self.pipeline: Pipeline = pipeline(folders.model)
-        self._parts: dict[str, Any] = {}
 
     def make(
         self,
@@ -102,40 +133,24 @@ class Generator:
             if not self.plan.keeps:
                 self.release()
 
-    @property
-    def device(self) -> torch.device:
-        return torch.device(self.plan.device)
-
-    @property
-    def dtype(self) -> torch.dtype:
-        """Return the precision of transformers and convolutions."""
-        return getattr(torch, self.plan.number)
-
     def part(self, role: str) -> Any:
-        """The network of a role, in memory; without `plan.keeps` it replaces the one before."""
-        if role not in self._parts:
-            if not self.plan.keeps:
-                self.release()
+        """The network of a role, in memory. Raises LiftError."""
+
+        def load() -> Any:
             where = self.pipeline.parts.get(role)
             if where is None:
                 raise LiftError(f"{self.folders.model / 'pipeline.json'} names no {role}")
             path = part_path(self.folders.model, where, self.folders.shared)
             log.info("Loading %s", path.name)
-            self._parts[role] = load_part(path, self.device, self.dtype)
-        return self._parts[role]
+            return load_part(path, self.device, self.dtype)
 
-    def release(self) -> None:
-        """Gives the memory of all parts back."""
-        self._parts.clear()
-        empty_cache(self.plan.device)
+        return self.held(role, load)
 
     def _encoder(self) -> Encoder:
-        if "encoder" not in self._parts:
-            if not self.plan.keeps:
-                self.release()
-            # In single precision: it runs once, and everything follows from it.
-            self._parts["encoder"] = Encoder(self.folders.encoder, self.device, torch.float32)
-        return self._parts["encoder"]
+        # In single precision: it runs once, and everything follows from it.
+        return self.held(
+            "encoder", lambda: Encoder(self.folders.encoder, self.device, torch.float32)
+        )
 
     def _seen(self, picture: ConditionPicture) -> Tensor:
         """(1, M, D) what the flows are told."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ...base.progress import Progress, part
 from ...document.gaussians import Gaussians
@@ -22,24 +23,24 @@ from .configs import Sampling
 
 if TYPE_CHECKING:
     from ...models.plans import Plan
-    from .generator import Folders, Generator, Made
-    from .picture import ConditionPicture
+    from .generator import Generator
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
 STEPS = 12  # of each flow: what the publishers' own example takes
 GUIDANCE = 7.5, 3.0  # of the flows, from the same place
 UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 FITS = 0.85  # score from which a pose that the network says itself is not looked for again
-PARAMETERS = 1_924_000_000  # counted; the encoder twice: it stays in single precision
-WORK = 2 << 30  # bytes beside the weights, estimated
 SPLATTING = "mip"  # as its Gaussians were trained
 
 
 class TrellisLifter:
     """Image to 3D (paper 3.1). `LiftSettings.count` does not apply: all Gaussians are kept."""
 
-    name = "trellis"
+    name, title = "trellis", "TRELLIS"
     ids: tuple[str, ...] = (configs.TRELLIS, configs.ENCODER)
+    parameters = 1_924_000_000  # counted; the encoder twice: it stays in single precision
+    work = 2 << 30  # bytes beside the weights, estimated
 
     def missing(self) -> str | None:
         """See `Lifter`."""
@@ -49,10 +50,7 @@ class TrellisLifter:
         self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int = 0
     ) -> LiftedObject:
         """See `Lifter`. The same seed gives the same object on one device."""
-        from .picture import ConditionPicture
-
-        picture = ConditionPicture.of(subject.matte)
-        gaussians, hints = self._made(picture, subject, part(progress, 0.0, 0.8), seed)
+        gaussians, hints = self._made(subject, settings, part(progress, 0.0, 0.8), seed)
         target = Target(subject.pixels, subject.mask, subject.camera)
         best = placed(gaussians, target, hints, part(progress, 0.8, 0.95), seed)
         log.info("Registered with an IoU of %.3f, score %.3f", best.iou, best.score)
@@ -62,32 +60,38 @@ class TrellisLifter:
         return replace(lifted, backend=self.name)
 
     def _made(
-        self, picture: ConditionPicture, subject: LiftSubject, progress: Progress, seed: int
+        self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
         """The object in our axes, and what is known of its pose."""
+        from .picture import ConditionPicture
+
+        picture = ConditionPicture.of(subject.matte)
         made = self.make(lambda g: g.make(picture, progress, seed, example_sampling(g)))
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP)
 
-    def make(self, use: Callable[[Generator], Made]) -> Made:
+    def make(self, use: Callable[[Any], T]) -> T:
         """What `use(generator)` makes, in the best way for which there is memory.
 
         Raises LiftError.
         """
-        from .generator import Folders
-
-        folders = Folders(*(configs.weights_folder(id) for id in self.ids))
+        folders = tuple(configs.weights_folder(id) for id in self.ids)
         model = ledger.Model(
-            self.name.upper(), folders, need(), lambda plan: self._new_generator(folders, plan)
+            self.title, folders, self.need(), lambda plan: self._new_generator(folders, plan)
         )
         try:
             return ledger.SHARED.run(model, lambda generator, _: use(generator))
         except ModelError as error:
             raise LiftError(f"{error}: close other programs, or lift it as a relief") from error
 
-    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
-        from .generator import Generator
+    def need(self) -> Need:
+        """Return the memory that it needs."""
+        numbers = ("float16",)  # as published
+        return Need(self.parameters, self.work, parts=True, numbers=numbers, is_slow_on_cpu=True)
 
-        return Generator(folders, plan)
+    def _new_generator(self, folders: tuple[Path, ...], plan: Plan) -> Any:
+        from .generator import Folders, Generator
+
+        return Generator(Folders(*folders), plan)
 
 
 def placed(
@@ -111,9 +115,3 @@ def example_sampling(generator: Generator) -> tuple[Sampling, Sampling]:
         for flow, guidance in zip((own.structure, own.latent), GUIDANCE, strict=True)
     )
     return first, second
-
-
-def need() -> Need:
-    """Return the memory that it needs."""
-    numbers = ("float16",)  # as published
-    return Need(PARAMETERS, WORK, parts=True, numbers=numbers, is_slow_on_cpu=True)

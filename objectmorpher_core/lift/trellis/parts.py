@@ -172,12 +172,17 @@ def load_part(path: Path, device: torch.device, dtype: torch.dtype) -> NetworkPa
     """
     with torch.device("meta"):
         part = build(read_json(path.with_name(path.name + ".json")))
+    return filled(part, path.with_name(path.name + ".safetensors"), device, dtype)
+
+
+def filled(part: NetworkPart, path: Path, device: torch.device, dtype: torch.dtype) -> NetworkPart:
+    """The part with the weights of a safetensors file, as `load_part` says. Raises LiftError."""
     wanted = part.state_dict()
     lower = part.lower_precision()
     found = {}
-    with opened(path.with_name(path.name + ".safetensors")) as file:
+    with opened(path) as file:
         shapes = {key: tuple(file.get_slice(key).get_shape()) for key in file.keys()}  # noqa: SIM118
-        refuse_differences(path.name, shapes, {key: tuple(t.shape) for key, t in wanted.items()})
+        refuse_differences(path.stem, shapes, {key: tuple(t.shape) for key, t in wanted.items()})
         for key in wanted:
             own = dtype if key in lower else torch.float32
             found[key] = file.get_tensor(key).to(device=device, dtype=own)

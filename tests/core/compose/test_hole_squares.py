@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.progress import silent
-from objectmorpher_core.compose.plate.hole_squares import fill_squares, squares
+from objectmorpher_core.compose.plate.hole_squares import Filler, fill_squares, squares
 
 SIDE = 64  # px that the network sees
 
@@ -42,7 +42,7 @@ def test_a_small_hole_is_seen_in_the_photos_own_pixels(china):
         seen.append((picture, inside))
         return picture
 
-    fill_squares(china, hole, SIDE, look, silent)
+    fill_squares(china, hole, Filler(SIDE, look), silent)
     ((picture, inside),) = seen
     (square,) = squares(hole, SIDE)
     x0, y0, x1, y1 = square.box
@@ -56,7 +56,7 @@ def test_a_small_hole_is_seen_in_the_photos_own_pixels(china):
 def test_strips_and_small_photos_are_mirrored_to_a_square(shape):
     photo = np.random.default_rng(0).integers(0, 256, (*shape, 3)).astype(np.uint8)
     hole = with_holes(shape, (2, 2, 5, 5))
-    filled = fill_squares(photo, hole, SIDE, lambda p, h, g, s: np.ones_like(p), silent)
+    filled = fill_squares(photo, hole, Filler(SIDE, lambda p, *_: np.ones_like(p)), silent)
     np.testing.assert_array_equal(filled[~hole], photo[~hole])
     assert (filled[hole] == 255).all()
 
@@ -76,7 +76,7 @@ def test_a_large_holes_answer_gets_the_photos_own_detail(china):
     def rough(pixels):
         return float(cv2.Laplacian(pixels.astype(np.float32), cv2.CV_32F)[hole].std())
 
-    filled = fill_squares(photo, hole, 80, oracle, silent)
+    filled = fill_squares(photo, hole, Filler(80, oracle), silent)
     assert 0.7 < rough(filled) / rough(photo) < 1.3
     low = [cv2.GaussianBlur(p.astype(np.float32), (0, 0), 6)[hole] for p in (filled, photo)]
     assert np.abs(low[0] - low[1]).mean() < 8
@@ -91,7 +91,7 @@ def test_seed_and_16_bit(china):
         told.append(seed)
         return np.full_like(picture, 0.12345)
 
-    filled = fill_squares(photo, hole, SIDE, look, silent, 7)
+    filled = fill_squares(photo, hole, Filler(SIDE, look), silent, 7)
     assert told == [7]
     np.testing.assert_array_equal(filled[~hole], photo[~hole])
     assert (filled[hole] == round(0.12345 * 65535)).all()

@@ -1,7 +1,8 @@
-"""PixelHacker, LaMa and MI-GAN, as tiny networks of random weights: their real code paths."""
+"""PixelHacker, Moebius, LaMa, MI-GAN as tiny networks of random weights: real code paths."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import pickle
 from pathlib import Path
@@ -13,12 +14,12 @@ import pytest
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import InpaintError, load
-from objectmorpher_core.compose.plate import inpaint_onnx, inpaint_pixelhacker
+from objectmorpher_core.compose.plate import inpaint_latent, inpaint_onnx
 from objectmorpher_core.models import ModelError, device, ledger
 from objectmorpher_core.models.plans import Plan
 from objectmorpher_core.models.tensors_only import take_tensors
 from tests.core.compose import tiny_inpainters
-from tests.core.models.local_hub import serving
+from tests.core.models.local_hub import offering
 from tests.core.models.small_networks import Ways
 
 pytestmark = pytest.mark.slow
@@ -75,7 +76,8 @@ def test_keys_and_shapes_are_the_published_ones():
     """As the published classes name them, with the published configuration: 862 M numbers."""
     torch = pytest.importorskip("torch")
     pytest.importorskip("diffusers")
-    from objectmorpher_core.compose.plate.pixelhacker import PUBLISHED, build
+    from objectmorpher_core.compose.plate.latent_diffusion import build
+    from objectmorpher_core.compose.plate.pixelhacker import PixelHacker
 
     def flat(tree: dict, path: str = "") -> dict[str, str]:
         found = {}
@@ -85,10 +87,40 @@ def test_keys_and_shapes_are_the_published_ones():
         return found
 
     with torch.device("meta"):
-        network = build(PUBLISHED)
+        network = build(PixelHacker)
     own = {key: "x".join(map(str, t.shape)) for key, t in network.state_dict().items()}
     assert own == flat(json.loads(KEYS.read_text(encoding="utf-8")))
     assert sum(t.numel() for t in network.parameters()) == 862_251_708
+
+
+MOEBIUS_KEYS = "fd06a49a2a94b7189289935f238b310fbfde85f42272e72bbe8e750bbbd951f0"  # SHA-256
+MOEBIUS_SAYS = (
+    -0.725156, 1.893795, 0.536151, 1.526541, -0.545873, 1.680731, 0.991451, 6.23414,
+)  # fmt: skip
+
+
+def test_moebius_is_the_published_network():
+    """Against numbers of the published code: names, shapes, and a tiny network's answer."""
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("diffusers")
+    from objectmorpher_core.compose.plate.latent_diffusion import build
+    from objectmorpher_core.compose.plate.moebius import Moebius
+
+    with torch.device("meta"):
+        network = build(Moebius)
+    told = sorted(f"{key} {tuple(t.shape)}" for key, t in network.state_dict().items())
+    assert hashlib.sha256("\n".join(told).encode()).hexdigest() == MOEBIUS_KEYS
+    assert sum(t.numel() for t in network.parameters()) == 226_041_531
+    random, tiny = np.random.default_rng(0), tiny_inpainters.latent("moebius")
+    for key, tensor in sorted(tiny.state_dict().items()):
+        if tensor.is_floating_point():
+            drawn = random.normal(0, 0.7, tensor.shape)
+            drawn = 0.5 + np.abs(drawn) if key.endswith("running_var") else drawn
+            tensor.copy_(torch.from_numpy(drawn))
+    latents = torch.from_numpy(random.normal(0, 1, (2, 9, 8, 8)).astype(np.float32))
+    with torch.no_grad():
+        said = tiny(latents, torch.tensor([701, 3]), torch.arange(20).view(2, -1))
+    np.testing.assert_allclose(said[:, :, 3, 4].numpy().ravel(), MOEBIUS_SAYS, rtol=SUMS)
 
 
 def test_another_seed_invents_something_else(pixelhacker, view, hole):
@@ -121,8 +153,9 @@ def test_each_step_is_told_and_can_be_the_last(pixelhacker, view, hole):
 
 def test_bfloat16_invents_nearly_the_same(pixelhacker):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker import load as load_network
-    from objectmorpher_core.compose.plate.pixelhacker import load_codec, sample
+    from objectmorpher_core.compose.plate.latent_diffusion import load as load_network
+    from objectmorpher_core.compose.plate.latent_diffusion import load_codec, sample
+    from objectmorpher_core.compose.plate.pixelhacker import PixelHacker
 
     codec = load_codec(pixelhacker / "vae", "cpu")
     weights = pixelhacker / "diffusion_pytorch_model.safetensors"
@@ -130,7 +163,7 @@ def test_bfloat16_invents_nearly_the_same(pixelhacker):
     inside = np.zeros((64, 64), bool)
     inside[20:40, 20:40] = True
     one, other = (
-        sample(load_network(weights, "cpu", number), codec, picture, inside, silent, 0)
+        sample(load_network(PixelHacker, weights, "cpu", number), codec, picture, inside, silent, 0)
         for number in (torch.float32, torch.bfloat16)
     )
     assert one.dtype == other.dtype == np.float32
@@ -139,7 +172,7 @@ def test_bfloat16_invents_nearly_the_same(pixelhacker):
 
 def test_the_masks_cells_are_whole():
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker import in_cells
+    from objectmorpher_core.compose.plate.latent_diffusion import in_cells
 
     mask = torch.zeros(1, 1, 32, 32)
     mask[..., 13, 13] = 1
@@ -149,16 +182,16 @@ def test_the_masks_cells_are_whole():
 
 def test_memory_that_runs_out_is_followed_by_the_next_tier(pixelhacker, view, hole, monkeypatch):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate import pixelhacker as network
+    from objectmorpher_core.compose.plate import latent_diffusion as network
 
     ways = Ways(Plan("cpu", "bfloat16", "whole"), Plan("cpu", "float32", "cpu"))
-    monkeypatch.setattr(inpaint_pixelhacker, "need", lambda parameters: ways)
+    monkeypatch.setattr(inpaint_latent, "need", lambda parameters: ways)
     load_network = network.load
 
-    def full(at: Path, where: str, number: Any) -> Any:
+    def full(kind: Any, at: Path, where: str, number: Any) -> Any:
         if number == torch.bfloat16:
             raise torch.OutOfMemoryError("CUDA out of memory")
-        return load_network(at, where, number)
+        return load_network(kind, at, where, number)
 
     monkeypatch.setattr(network, "load", full)
     filled = load("pixelhacker").inpaint(view, hole, silent)
@@ -169,7 +202,7 @@ def test_memory_that_runs_out_is_followed_by_the_next_tier(pixelhacker, view, ho
 def test_auto_takes_what_is_there_and_quick_and_heeds_hints(family, monkeypatch):
     name, _ = family
     monkeypatch.setenv(device.DEVICE, "cpu")
-    assert load("auto").name == ("patchmatch" if name == "pixelhacker" else name)
+    assert load("auto").name == ("patchmatch" if name in tiny_inpainters.LATENT else name)
     assert load("auto", has_hints=True).name == "patchmatch"
     models.remove_hub(name)
     assert load("auto").name == "patchmatch"
@@ -185,7 +218,7 @@ def test_a_file_cut_off_is_one_sentence(family, view, hole):
     assert models.look_hub(name).state == "damaged"
     with pytest.raises(InpaintError, match="is not here"):
         load(name)
-    if name == "pixelhacker":  # as one that is brought anew
+    if name in tiny_inpainters.LATENT:  # as one that is brought anew
         with pytest.raises(ModelError, match="cut off"):
             models.use_folder(name, folder)
         return
@@ -279,17 +312,12 @@ def test_a_pickle_that_holds_more_than_numbers_is_refused(pixelhacker, tmp_path)
 def test_what_the_hub_has_as_pickles_arrives_as_numbers(
     pixelhacker, tmp_path, monkeypatch, view, hole
 ):
-    pytest.importorskip("huggingface_hub")
     published = as_published(pixelhacker, tmp_path / "published")
     before = load("pixelhacker").inpaint(view, hole, silent)
     models.remove_hub("pixelhacker")
     model = models.hub_model("pixelhacker")
     monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
-    with serving() as server:
-        monkeypatch.setenv("HF_ENDPOINT", server.url)
-        server.repositories[model.repository] = {
-            name: (published / name).read_bytes() for name in model.files
-        }
+    with offering(monkeypatch, {n: (published / n).read_bytes() for n in model.files}, model):
         at = models.get("pixelhacker")
     assert sorted(p.suffix for p in models.files("pixelhacker")) == [
         ".json", ".safetensors", ".safetensors"

@@ -13,7 +13,7 @@ from objectmorpher_core import models
 from objectmorpher_core.models.onnx_session import as_varint, bytes_field
 from tests.core.models.small_networks import floats, integer, integers, model, node
 
-FAMILIES = ("pixelhacker", "lama", "migan")
+FAMILIES = ("pixelhacker", "moebius", "lama", "migan")  # one model each
 SIDE = 64  # px that the tiny networks see
 FLOAT, BYTE = 1, 2  # TensorProto's numbers of types
 TINY = {
@@ -22,15 +22,18 @@ TINY = {
     "up_block_types": ["UpBlock2D", "CrossAttnUpBlock2D"], "attention_head_dim": 2,
     "cross_attention_dim": 12, "encoder_hid_dim": 20, "norm_num_groups": 4,
 }  # fmt: skip
+TINIEST = {**TINY, "block_out_channels": [8, 16, 24]}  # three levels without a middle: Moebius
+del TINIEST["down_block_types"], TINIEST["up_block_types"]
+LATENT = {"pixelhacker": TINY, "moebius": TINIEST}
 
 
 def bring(name: str, at: Path, monkeypatch: pytest.MonkeyPatch, seed: int = 0) -> Path:
     """A tiny `name` is the one that is used, out of a folder below `at`."""
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(at / "cache"))
     folder = at / name
-    if name == "pixelhacker":
+    if name in LATENT:
         pytest.importorskip("diffusers")
-        write_pixelhacker(folder, seed)
+        write_latent(name, folder, seed)
         models.use_folder(name, folder)
         return folder
     folder.mkdir(parents=True)
@@ -39,27 +42,27 @@ def bring(name: str, at: Path, monkeypatch: pytest.MonkeyPatch, seed: int = 0) -
     return folder
 
 
-_written: dict[int, dict[str, bytes]] = {}  # seed -> files
+_written: dict[tuple[str, int], dict[str, bytes]] = {}  # name, seed -> files
 
 
-def write_pixelhacker(folder: Path, seed: int = 0) -> None:
+def write_latent(name: str, folder: Path, seed: int = 0) -> None:
     """config.json and the weights, and vae/ beside them."""
-    if seed not in _written:
-        _make(folder, seed)
+    if (name, seed) not in _written:
+        _make(name, folder, seed)
         files = [p for p in folder.rglob("*") if p.is_file()]
-        _written[seed] = {p.relative_to(folder).as_posix(): p.read_bytes() for p in files}
-    for name, content in _written[seed].items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
+        _written[name, seed] = {p.relative_to(folder).as_posix(): p.read_bytes() for p in files}
+    for path, content in _written[name, seed].items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(content)
 
 
-def _make(folder: Path, seed: int) -> None:
+def _make(name: str, folder: Path, seed: int) -> None:
     from diffusers import AutoencoderKL
     from safetensors.torch import save_file
 
-    network = pixelhacker(seed)
+    network = latent(name, seed)
     folder.mkdir(parents=True)
-    (folder / "config.json").write_text(json.dumps(TINY))
+    (folder / "config.json").write_text(json.dumps(LATENT[name]))
     save_file(network.state_dict(), str(folder / "diffusion_pytorch_model.safetensors"))
     codec = AutoencoderKL(
         block_out_channels=(4, 4, 4, 8), layers_per_block=1, norm_num_groups=4,
@@ -69,14 +72,16 @@ def _make(folder: Path, seed: int) -> None:
     codec.save_pretrained(folder / "vae")
 
 
-def pixelhacker(seed: int = 0) -> Any:
+def latent(name: str, seed: int = 0) -> Any:
     """The network, in memory."""
     import torch
 
-    from objectmorpher_core.compose.plate.pixelhacker import PUBLISHED, build
+    from objectmorpher_core.compose.plate.inpaint_latent import LatentInpainter
+    from objectmorpher_core.compose.plate.latent_diffusion import build
 
     torch.manual_seed(seed)
-    return build({**PUBLISHED, **TINY}).eval()
+    kind = LatentInpainter(name).kind()
+    return build(kind, {**kind.published, **LATENT[name]}).eval()
 
 
 def value(name: str, kind: int, channels: int) -> bytes:

@@ -47,6 +47,8 @@ def test_the_pages_table_is_what_is_counted(pages: Any) -> None:
         ("sam-vit-huge", ("sam-vit-huge",)), ("depth-anything-v2-small", ("depth",)),
         ("dinov2-with-registers-large", ("dino",)),
         ("pixelhacker", ("pixelhacker", "pixelhacker-vae")),
+        ("triposplat", ("dino3", "klein-vae", "triposplat-flow", "triposplat-decoder")),
+        ("moebius", ("moebius", "pixelhacker-vae")),
         ("qwen-image-edit-2511", ("qwen", "qwen-text", "qwen-vae")),
         ("flux2-klein-4b", ("klein", "klein-text", "klein-vae")),
     ],

@@ -234,8 +234,10 @@ def _lower(text: str) -> str:
 
 NAMES = {
     "sam2": "SAM 2.1", "sam3": "SAM 3", "sam": "SAM", "sam-onnx": "Small SAMs (ONNX)",
-    "pixelhacker": "PixelHacker", "lama": "LaMa", "migan": "MI-GAN",
-    "trellis": "TRELLIS", "cupid": "CUPID", "dinov2-with-registers": "DINOv2 with registers",
+    "pixelhacker": "PixelHacker", "moebius": "Moebius",
+    "pixelhacker-vae": "PixelHacker's autoencoder", "lama": "LaMa", "migan": "MI-GAN",
+    "trellis": "TRELLIS", "cupid": "CUPID", "triposplat": "TripoSplat",
+    "dinov2-with-registers": "DINOv2 with registers",
     "depth-anything": "Depth Anything V2, by PyTorch", "depth-graph": "Depth, without a GPU",
     "qwen-image-edit": "Qwen-Image-Edit",
     "qwen-image-edit-2511-lightning": "Lightning for Qwen-Image-Edit-2511",
@@ -243,6 +245,7 @@ NAMES = {
     "qwen-refine-lora": "Your LoRA on Qwen-Image-Edit",
     "flux2-klein": "FLUX.2-klein", "flux2-klein-base": "FLUX.2-klein, base",
     "klein-refine-lora": "Your LoRA on FLUX.2-klein",
+    "klein-remove-lora": "Object removal for FLUX.2-klein",
 }  # fmt: skip
 GAINS = {
     "sam2": "Clicks select nearly anything; parts, objects and groups",
@@ -250,10 +253,13 @@ GAINS = {
     "sam": "The first of its kind, which the paper uses",
     "sam-onnx": "Smaller and quicker, without PyTorch",
     "pixelhacker": "Invents what is behind objects, for a GPU: the paper's",
+    "moebius": "The same with a quarter of the numbers; also needs PixelHacker's autoencoder",
+    "pixelhacker-vae": "What Moebius draws with; PixelHacker brings it, too",
     "lama": "Invents what is behind large objects, without a GPU",
     "migan": "Invents what is behind objects, the quickest",
     "trellis": "The whole object from one picture, for a GPU: the paper's",
     "cupid": "The same with the photo's camera; also needs TRELLIS",
+    "triposplat": "The whole object in as many splats as you want, for a GPU; by DINOv3",
     "dinov2-with-registers": "What TRELLIS and CUPID see a picture with",
     "depth-anything": "A lifted object is as deep as it looks, not as its outline says",
     "depth-graph": "A lifted object is as deep as it looks, without PyTorch or a GPU",
@@ -264,6 +270,7 @@ GAINS = {
     "flux2-klein": "Makes the edit look photographed, in four steps, for a GPU of 12 GB",
     "flux2-klein-base": "What a LoRA of yours for FLUX.2-klein is trained on",
     "klein-refine-lora": "What you have trained it to do",
+    "klein-remove-lora": "Objects go with their shadows and reflections; also needs FLUX.2-klein",
 }
 SIZES = {
     "sam2.1-tiny": "Tiny", "sam2.1-small": "Small", "sam2.1-base-plus": "Base",

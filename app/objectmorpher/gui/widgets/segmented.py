@@ -20,8 +20,8 @@ from .widgets import drawn_button, tooltip
 NAMES = {
     "dino": "DINOv2's pieces", "grabcut": "Colours", "sam2": "SAM 2.1", "sam3": "SAM 3",
     "sam": "SAM", "sam-onnx": "Small SAMs (ONNX)",
-    "relief": "Relief", "trellis": "TRELLIS", "cupid": "CUPID",
-    "pixelhacker": "PixelHacker", "lama": "LaMa", "migan": "MI-GAN",
+    "relief": "Relief", "trellis": "TRELLIS", "cupid": "CUPID", "triposplat": "TripoSplat",
+    "pixelhacker": "PixelHacker", "moebius": "Moebius", "lama": "LaMa", "migan": "MI-GAN",
     "patchmatch": "Patches", "telea": "Smooth",
     "qwen": "Qwen-Image-Edit", "klein": "FLUX.2 klein",
 }  # fmt: skip

@@ -15,13 +15,15 @@ pytest.importorskip("diffusers")
 pytest.importorskip("peft")
 
 import tiny_pipelines
+import torch
 from diffusers import Flux2Transformer2DModel, QwenImageTransformer2DModel
 from diffusers.pipelines.qwenimage import pipeline_qwenimage_edit_plus
-from safetensors.torch import load_file
+from safetensors.torch import load_file, save_file
 
-from objectmorpher_core import models
+from objectmorpher_core import compose, models
 from objectmorpher_core.base.progress import Cancelled, silent
-from objectmorpher_core.compose import refine
+from objectmorpher_core.compose import InpaintError, refine
+from objectmorpher_core.compose.plate.inpaint_klein import framed
 from objectmorpher_core.compose.refine import RefineError, diffusion, klein
 from objectmorpher_core.models import ModelError, ledger
 from tests import photos
@@ -121,6 +123,63 @@ def test_lightning_of_another_version_is_not_used(folders, tmp_path):
     )
     models.use_folder("qwen-image-edit-2509-lightning-8", at)
     assert refiner.lightning() is None
+
+
+def test_removal_shares_the_refiners_pipeline_and_neither_has_the_others_adapter(folders, tmp_path):
+    refiner, given = put("klein", folders), pictures()
+    plain = refiner.refine(*given, silent)
+    with pytest.raises(InpaintError, match="models get klein-remove-lora"):
+        compose.load("klein")
+    transformer = folders["klein"] / "transformer"
+    at = tiny_pipelines.write_lora(tmp_path / "lora", transformer, KINDS["klein"], 5)
+    models.use_folder("klein-remove-lora", at)
+    remover, hole = compose.load("klein"), np.zeros((60, 60), bool)
+    hole[20:35, 25:40] = True
+    assert np.array_equal(refiner.refine(*given, silent), plain)
+    pipeline = ledger.SHARED.opened("the refiner")
+    filled = remover.inpaint(given[0], hole, silent)
+    assert pipeline.get_active_adapters() == ["removal"]
+    assert np.array_equal(refiner.refine(*given, silent), plain)
+    assert ledger.SHARED.opened("the refiner") is pipeline  # counted once
+    assert np.array_equal(remover.inpaint(given[0], hole, silent), filled)
+    # It sees what is to go, and what it makes of the rest is not taken.
+    other = given[0].copy()
+    other[26:30, 30:34] = 255 - other[26:30, 30:34]
+    assert not np.array_equal(remover.inpaint(other, hole, silent)[hole], filled[hole])
+    assert np.array_equal(filled[~hole], given[0][~hole])
+
+
+def test_a_red_frame_shows_each_part_that_is_to_go():
+    inside = np.zeros((400, 400), bool)
+    inside[50:90, 60:100] = inside[200:300, 220:240] = True
+    shown = framed(np.full((400, 400, 3), 0.5, np.float32), inside)
+    red = (shown == [255, 0, 0]).all(2)
+    count, _, boxes, _ = cv2.connectedComponentsWithStats(red.astype(np.uint8))
+    assert count == 3 and np.abs(boxes[1:, 2:4] - [[40, 40], [20, 100]]).max() <= 3
+    assert not red[60:80, 70:90].any() and (shown[~red] == 128).all()
+
+
+def test_an_adapter_in_comfyuis_names_is_read(folders, tmp_path):
+    """The published one has them."""
+    put("klein", folders)
+    given = pictures()
+    transformer = Flux2Transformer2DModel.from_pretrained(folders["klein"] / "transformer")
+    inner = transformer.transformer_blocks[0].attn.to_q.in_features
+    random, found = torch.Generator().manual_seed(0), {}
+    for name, out in (("double_blocks.0.img_attn.qkv", 3 * inner), ("img_in", inner)):
+        of = inner if "qkv" in name else transformer.x_embedder.in_features
+        for side, shape in (("A", (16, of)), ("B", (out, 16))):
+            key = f"diffusion_model.{name}.lora_{side}.weight"
+            found[key] = torch.randn(shape, generator=random)
+    (tmp_path / "lora").mkdir()
+    save_file(found, tmp_path / "lora" / "comfy.safetensors")
+    models.use_folder("klein-remove-lora", tmp_path / "lora")
+    hole = np.zeros((60, 60), bool)
+    hole[20:35, 25:40] = True
+    adapted = compose.load("klein").inpaint(given[0], hole, silent)
+    remover = compose.load("klein")
+    remover.strength = 0.0
+    assert not np.array_equal(remover.inpaint(given[0], hole, silent), adapted)
 
 
 def test_klein_needs_its_text_encoder_once(folders, tmp_path):

@@ -1,4 +1,4 @@
-"""What every lifter keeps to: the relief, TRELLIS and CUPID of random weights, and a worker."""
+"""What every lifter keeps to: the relief, generators of random weights, and a worker."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from objectmorpher_core.models import device
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests.core.lift.trellis import tiny_trellis
 from tests.core.lift.trellis.test_cupid_lifter import CUPID_PARTS, SHARED_PARTS
+from tests.core.lift.triposplat import tiny_triposplat
 
 pytestmark = pytest.mark.slow
 
@@ -38,6 +39,8 @@ def lifter(request, tmp_path_factory):
         tiny_trellis.write_encoder(root / "dinov2-with-registers-large")
         tiny_trellis.write_model(root / "trellis-image-large", SHARED_PARTS)
     with pytest.MonkeyPatch.context() as patch:
+        if name == "triposplat":
+            tiny_triposplat.bring(root / name, patch)
         patch.setenv("OBJECTMORPHER_CACHE", str(root.parent))
         patch.setenv(worker_file.FOLDER, str(WORKERS))
         patch.setenv(device.DEVICE, "cpu")

@@ -18,7 +18,7 @@ from safetensors.torch import load_file, save_file
 from objectmorpher_core import lift
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.trellis import configs, lifter
+from objectmorpher_core.lift.trellis import configs
 from objectmorpher_core.lift.trellis import generator as generators
 from objectmorpher_core.lift.trellis.generator import Generator, unseen
 from objectmorpher_core.lift.trellis.lifter import TrellisLifter
@@ -151,7 +151,7 @@ def test_too_many_cells_are_cut_to_the_surest(monkeypatch):
 
 def test_out_of_memory_falls_back_to_one_part_at_a_time(installed, picture, monkeypatch):
     whole = replace(tiny_trellis.CPU, way="whole", kept=1)
-    monkeypatch.setattr(lifter, "need", lambda: Ways(whole, tiny_trellis.CPU))
+    monkeypatch.setattr(TrellisLifter, "need", lambda self: Ways(whole, tiny_trellis.CPU))
 
     def make(generator):
         if generator.plan.keeps:

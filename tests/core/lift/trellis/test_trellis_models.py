@@ -118,7 +118,7 @@ def test_a_gpu_that_is_not_there_is_one_sentence(monkeypatch):
 
 def test_a_gpu_with_little_room_gets_a_part_at_a_time_and_none_is_an_hour_s_work(monkeypatch):
     monkeypatch.setattr(device, "devices", lambda: ("mps", "cpu"))
-    model = ledger.Model("TRELLIS", 0, lifter.need(), lambda plan: plan)
+    model = ledger.Model("TRELLIS", 0, lifter.TrellisLifter().need(), lambda plan: plan)
     for free, expected in ((16, "whole"), (4, "parts")):
         monkeypatch.setattr(device, "free_memory", lambda _, free=free: free << 30)
         plan = ledger.SHARED.plan(model)
