@@ -34,10 +34,10 @@ from .sides import APART, GAP, side_by_side, with_sides
 REACH = 0.9  # x extent, to either side of a front, where it is looked for
 STEPS = 97  # places there
 BESIDE = 0.012  # x the object's size in a further photo, by which a silhouette may be wrong
+FARTHEST = 0.3  # x extent, by which a surface moves: what would have to move more is another one
 SPREAD = 0.02  # x extent, over which a surface follows a silhouette
 ROUNDS = 8  # in which it does
 APART_PX = 0.02  # x the object's size there, by which two lines of sight may miss each other
-FARTHEST = 0.5  # x extent, by which a detail's depth may differ from the lifter's
 UNLIKE = 0.08  # x extent, by which it may differ from what the details around say
 AROUND = 6  # of those
 DETAIL = 0.06  # x extent, over which a detail says how deep the surface is
@@ -97,7 +97,7 @@ class _Rays:
         lowest = grid[_ends(may, within, grid)] + front + moved
         excess = np.maximum(lowest - (back + moved + within), 0) * self.inside
         share = self._spread(
-            np.clip(1 - excess / thickness, THINNEST, 1), 0.3 + 0.7 * (excess > 0), SPREAD
+            np.clip(1 - excess / thickness, THINNEST, 1), np.where(excess > 0, 1.0, 0.3), SPREAD
         )
         share = np.where(self.inside, share, 1.0)
         front = front + moved + within
@@ -139,6 +139,7 @@ class _Rays:
             off = np.where(may, np.abs(grid[:, None, None] - moved), np.inf)
             nearest = off.argmin(0)
             is_any = np.isfinite(np.take_along_axis(off, nearest[None], 0)[0]) & self.inside
+            is_any &= np.abs(grid[nearest]) < FARTHEST * self.extent
             lacking = np.where(is_any, grid[nearest] - moved, 0.0)
             lacking = np.where(np.abs(lacking) < 0.5 * (grid[1] - grid[0]), 0.0, lacking)
             moved += self._spread(lacking, 0.25 + 0.75 * (lacking != 0), SPREAD)
