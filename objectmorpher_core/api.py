@@ -60,6 +60,7 @@ class Shape(TypedDict, total=False):
     trust: float  # in the shape network, 0 to 1
     no_depth: bool
     hidden: str  # file
+    more_views: list[dict[str, Any]]  # {"photo": file, "at": (x, y)}, of further photos of it
     decontaminate: float  # of the background's colour in its edge, 0 to 1
     splats: str  # file: a splat or mesh file takes the object's place
     flip: bool

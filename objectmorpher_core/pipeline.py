@@ -28,6 +28,7 @@ from .document.edge_edits import set_decontaminate
 from .document.key_edits import with_keys
 from .document.model import (
     AS_SEEN,
+    Click,
     Document,
     LiftedObject,
     LiftSettings,
@@ -37,6 +38,7 @@ from .document.model import (
     Prompt,
 )
 from .document.settings import Hint
+from .lift.registration.further import OtherPhoto, with_photo
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
 from .lift.relief.depth_look import look_at_all
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
@@ -396,8 +398,12 @@ def _lift(document: Document, k: int, script: EditScript, progress: Progress) ->
     """Object `k`, which is chosen, in 3D: lifted, or out of the script's file."""
     photo, mask = document.photo, document.objects[k].selection
     assert mask is not None, "it was chosen"
+    if script.splats is not None and script.more_views:
+        raise ScriptError("more_views: a shape from a file is not changed by photos")
     if script.splats is None:
         settings = runner.lift_settings(document, script)
+        if script.more_views:
+            return _lift_all_round(document, k, script, settings, progress)
         made = lift_mask(
             photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed
         )
@@ -411,6 +417,35 @@ def _lift(document: Document, k: int, script: EditScript, progress: Progress) ->
     rest = part(progress, 0.8, 1.0)
     made = place_import(scene, found.gaussians, best, rest, script.seed)
     return edits.set_lifted(document, k, *made)
+
+
+def _lift_all_round(
+    document: Document, k: int, script: EditScript, settings: LiftSettings, progress: Progress
+) -> Document:
+    """Object `k`, which is chosen, lifted from all its photos."""
+    if script.lift not in ("auto", "relief"):
+        raise ScriptError(f"more_views: the lifter {script.lift} makes a shape from one photo")
+    photo, mask = document.photo, document.objects[k].selection
+    assert mask is not None, "it was chosen"
+    matte, lifted = cut_out(photo.pixels, mask), None
+    subject = lift.LiftSubject(photo.pixels, photo.camera, is_selected(mask), matte)
+    count = len(script.more_views)
+    for number, wanted in enumerate(script.more_views):
+        step = part(progress, number / count, (number + 1) / count)
+        path = Path(wanted.photo)
+        try:
+            other = open_photo(read_input(path), path.name, script.fov, script.seed)
+            prompt = Prompt((Click(*wanted.at),)) if wanted.at else Prompt(is_subject=True)
+            reading = read_photo(other.photo.pixels, segment.load(script.segment), silent)
+            found = reading.segment(prompt, part(step, 0.0, 0.2), script.seed).mask
+            taken = OtherPhoto(path.name, other.photo.pixels, other.photo.camera, found)
+            settings, lifted = with_photo(
+                subject, settings, lift.load(script.lift), taken, part(step, 0.2, 1.0), script.seed
+            )
+        except ValueError as error:
+            raise ScriptError(f"more_views {path.name}: {error}") from error
+    assert lifted is not None, "there is a further photo"
+    return edits.set_lifted(document, k, matte, lifted, settings)
 
 
 def replay(document: Document, progress: Progress = silent) -> Edited:

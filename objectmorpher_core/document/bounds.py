@@ -13,3 +13,4 @@ MOST_SATURATION = 2.0
 MOST_SHARPNESS = 3.0
 MOST_BLUR = 50.0  # px
 NORMAL, MULTIPLY, SCREEN, SOFT_LIGHT = MODES = ("normal", "multiply", "screen", "soft light")
+MOST_VIEWS = 3  # further photos of an object

@@ -25,6 +25,7 @@ from .paint import Paint
 from .pose import UNHELD, Base, Handle, Pose
 from .rig import Rig
 from .settings import AS_IN_THE_PHOTO, Finish, Hint, Refined, Shadow
+from .views import FurtherView, Sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,50 +141,6 @@ class PhotoTexture:
             object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
 
 
-@dataclass(frozen=True, eq=False)
-class Sides:
-    """Invented pictures of the sides that a photo does not show, and where each Gaussian looks.
-
-    A Gaussian takes what it shows from there once it faces the camera so much more than it faced
-    the photo's that the photo would be stretched over it (`raster.rules`).
-    """
-
-    pixels: U8  # (h, w, 3) sRGB
-    left: int  # px of the photo, where the corner of the pixels lies in the object's texture
-    top: int
-    at: F32  # (N, 2) px of the photo: what each Gaussian's mean shows
-    slopes: F32  # (N, 2, 3) px per world unit at rest
-    zoom: F32  # (N,) px per world unit of the picture; 0: the Gaussian is on none
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", frozen(self.pixels, np.uint8))
-        for name in ("at", "slopes", "zoom"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
-
-    def select(self, index: np.ndarray) -> Sides:
-        """Of the Gaussians at `index` (integers or booleans)."""
-        return replace(self, at=self.at[index], slopes=self.slopes[index], zoom=self.zoom[index])
-
-    def followed_by(self, count: int) -> Sides:
-        """With `count` more Gaussians that are on none of the pictures."""
-        parts = (self.at, self.slopes, self.zoom)
-        at, slopes, zoom = (
-            np.concatenate([part, np.zeros((count, *part.shape[1:]), np.float32)]) for part in parts
-        )
-        return replace(self, at=at, slopes=slopes, zoom=zoom)
-
-    def moved(self, offsets: np.ndarray, linear: np.ndarray | None = None) -> Sides:
-        """Of Gaussians that lie `offsets` (N, 3) world units aside, on the same surface.
-
-        `linear` (N, 3, 3): the surface itself was deformed so about each of them.
-        """
-        at, slopes = self.at, self.slopes.astype(np.float64)
-        if linear is not None:
-            slopes = slopes @ np.linalg.inv(linear)
-        at = at + np.einsum("nij,nj->ni", slopes, offsets)
-        return replace(self, at=at, slopes=slopes)
-
-
 @dataclass(frozen=True)
 class Origin:
     """The other photo that an object comes from: what of it has to be known where it is now."""
@@ -211,6 +168,7 @@ class LiftSettings:
     uses_depth: bool = True  # whether a depth network, where one is installed, may tell its relief
     trust: float = 1.0  # in the shape network, of [0, 1]; 0: the silhouette alone tells the shape
     kind: str = "auto"  # of KINDS: what it is
+    views: tuple[FurtherView, ...] = ()  # further photos of it
 
     def __post_init__(self) -> None:
         if self.back not in BACKS:

@@ -33,10 +33,10 @@ from ..document.model import (
     PhotoTexture,
     Placement,
     Plate,
-    Sides,
 )
 from ..document.paint import Paint
 from ..document.pose import Base, Pose
+from ..document.views import Sides
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width, cut_out
 from . import LiftError, LiftSubject, load

@@ -57,6 +57,8 @@ def trust_in(splats: PosedSplats) -> Trust:
     # What was seen from nearly edge on is not known, either.
     is_seen = lifted.texture.visibility[few] > 0
     is_seen &= rest.cosines[few] >= EDGE_ON * cosines
+    if lifted.sides is not None and lifted.sides.real is not None:
+        is_seen |= lifted.sides.real[few]
     total = max(float(area.sum()), 1e-9)
     invented = float(area[~is_seen].sum()) / total
     # A depth that is wrong shows as far as its line of sight is seen from the side now.

@@ -21,6 +21,7 @@ from ..document.bounds import (
     MOST_SATURATION,
     MOST_SHARPNESS,
     MOST_THICKNESS,
+    MOST_VIEWS,
     NORMAL,
 )
 
@@ -58,6 +59,14 @@ class FillFrom:
     source: XY  # px
     to: XY  # px
     radius: float | None = None  # px; None: the usual share of the photo
+
+
+@dataclass(frozen=True)
+class MoreView:
+    """A further photo of the object."""
+
+    photo: str  # file
+    at: XY | None = None  # px, on the object there; None: that photo's main subject
 
 
 def _number(key: str, value: Any) -> float:
@@ -116,6 +125,21 @@ def _source(key: str, value: Any) -> FillFrom:
         raise ScriptError(f"{key}: a radius of {shown(radius)} px is none")
     known_radius = None if radius is None else float(radius)
     return FillFrom((source[0], source[1]), (to[0], to[1]), known_radius)
+
+
+def _views(key: str, value: Any) -> tuple[MoreView, ...]:
+    if not isinstance(value, list | tuple) or len(value) > MOST_VIEWS:
+        raise ScriptError(f"{key}: {shown(value)} is not a list of at most {MOST_VIEWS} photos")
+    return tuple(_view(key, v) for v in value)
+
+
+def _view(key: str, value: Any) -> MoreView:
+    if isinstance(value, MoreView):
+        return value
+    if not isinstance(value, dict) or not {"photo"} <= set(value) <= {"photo", "at"}:
+        raise ScriptError(f'{key}: {shown(value)} is not {{"photo": "FILE", "at": [x, y]}}')
+    at = None if value.get("at") is None else _numbers(2, 2)(key, value["at"])
+    return MoreView(_text(key, value["photo"]), None if at is None else (at[0], at[1]))
 
 
 def _keys(key: str, value: Any) -> tuple[EditScript, ...]:
@@ -186,8 +210,8 @@ class Values:
     """The values of an option: `read` checks one of a script, by the option's name.
 
     `kind` names how they are written on the command line: "text", "flag", "number", "whole",
-    "numbers" with commas, or one of "points", "handles", "sources" and "keys", of which there may
-    be several.
+    "numbers" with commas, or one of "points", "handles", "sources", "views" and "keys", of which
+    there may be several.
     """
 
     kind: str
@@ -198,6 +222,7 @@ class Values:
 FLAG, TEXT, NUMBER = Values("flag", _flag), Values("text", _text), Values("number", _number)
 POINTS, HANDLES = Values("points", _points, (2, 2)), Values("handles", _handles)
 SOURCES, KEYS = Values("sources", _sources), Values("keys", _keys)
+VIEWS = Values("views", _views)
 SHARE = Values("number", _between(0, 1))
 
 
@@ -319,6 +344,10 @@ class EditScript:
     hidden: str | None = _option(
         None, TEXT, _SHAPE, "M.png", "a mask of its parts that are hidden behind something"
     )
+    more_views: tuple[MoreView, ...] = _option(
+        (), VIEWS, _SHAPE, "FILE[@X,Y]",
+        "another photo of the same thing, seen at X,Y there, from another side; up to three",
+    )  # fmt: skip
     decontaminate: float = _option(
         0.0, SHARE, _SHAPE, "S",
         "take this share of the background's colour out of its edge, 0 to 1",
@@ -440,4 +469,5 @@ def said_by(script: EditScript, said: frozenset[str] = frozenset()) -> dict[str,
 
 def files_of(script: EditScript) -> tuple[str | None, ...]:
     """Return the files that an edit reads beside the photo."""
-    return script.mask, script.front_mask, script.hidden, script.splats
+    further = (view.photo for view in script.more_views)
+    return script.mask, script.front_mask, script.hidden, script.splats, *further

@@ -116,6 +116,7 @@ def beside(item: BatchItem, folder: Path) -> BatchItem:
         return replace(
             script, mask=at(script.mask), front_mask=at(script.front_mask),
             hidden=found(script.hidden), splats=found(script.splats),
+            more_views=tuple(replace(v, photo=str(folder / v.photo)) for v in script.more_views),
         )  # fmt: skip
 
     objects = tuple(replace(each, script=own(each.script)) for each in item.others.objects)

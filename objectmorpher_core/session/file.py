@@ -43,7 +43,7 @@ FORMAT = "objectmorpher session"
 DOCUMENT, ARRAYS = "document.json", "arrays.npz"
 MOST_TEXTURE = 1 << 20  # px, how far from the photo's corner an object's texture may lie
 MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
-MOST_INVENTED = 2_000_000  # px of invented pictures: a small photo has fewer
+MOST_INVENTED = 16_000_000  # px of an object's pictures of its sides, and of further photos
 
 
 def save_session(document: Document, path: Path) -> None:
@@ -309,6 +309,8 @@ def _check(document: Document) -> None:
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
             _near("matte", item.matte.box, _size_around(item, (width, height)))
+        for view in item.shape.views:
+            view.check()
         _check_paint(item)
         _check_lifted(item)
         if item.seen_from is not None and not 0 <= item.seen_from <= 90:

@@ -37,6 +37,7 @@ FULL = {
     "front-mask": "f.png", "remove": True, "refine-strength": 0.5, "decontaminate": 0.5,
     "opacity": 0.5, "exposure": -1.0, "warmth": 0.25, "saturation": 0.5, "sharpness": 1.5,
     "blur": 2.0, "blend-mode": "soft light",
+    "more-views": [{"photo": "b.png", "at": [3, 4]}, {"photo": "c.png"}],
     "fill-from": [{"source": [1, 2], "to": [3, 4], "radius": 5}, {"source": [1, 2], "to": [3, 4]}],
 }  # fmt: skip
 

@@ -65,6 +65,7 @@ def values() -> dict[str, SearchStrategy[str]]:
         "YAW[,PITCH,ROLL]": joined(1, 3), "POSE": names, "X,Y:X2,Y2[,DZ]": pairs(True),
         "X,Y:X2,Y2[,R]": pairs(True),
         "NAME": names, "KIND": names, "MODE": names, "auto|yes|no": names, "auto|none": names,
+        "FILE[@X,Y]": st.one_of(files, st.tuples(files, joined(2, 2)).map("@".join)),
         "M.png": files, "FILE": outs, "FILE.ora": outs, "FILE.glb": outs, "R.json": outs,
         "S.omorph": outs,
         "EDIT.json": st.sampled_from(["p/script.json", "p/text.png", "p/none.json"]),

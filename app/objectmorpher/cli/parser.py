@@ -153,7 +153,8 @@ def _add_options(parser: argparse.ArgumentParser, *headings: str) -> None:
 
 def _reading(option: Option) -> dict[str, Any]:
     """Return how argparse reads the values of an option. One that is not given is None."""
-    several = {"points": _list(2, 2), "handles": _handle, "sources": _fill_from, "keys": _key}
+    several = {"points": _list(2, 2), "handles": _handle, "sources": _fill_from, "keys": _key,
+               "views": _more_view}  # fmt: skip
     one = {"number": float, "whole": int, "numbers": _list(*option.values.counts)}
     kind = option.values.kind
     if kind == "flag":
@@ -397,6 +398,14 @@ def _fill_from(text: str) -> dict[str, Any]:
     target = _list(2, 3)(to)
     radius = {"radius": target[2]} if target[2:] else {}
     return {"source": _list(2, 2)(source), "to": target[:2], **radius}
+
+
+def _more_view(text: str) -> dict[str, Any]:
+    """A file name may hold the sign itself: only numbers behind the last one are a place."""
+    photo, sign, at = text.rpartition("@")
+    if sign and re.fullmatch(r"[-+.,\deE]+", at):
+        return {"photo": photo, "at": _list(2, 2)(at)}
+    return {"photo": text}
 
 
 def _command(

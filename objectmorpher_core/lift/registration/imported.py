@@ -31,7 +31,7 @@ from ...splat_files import COUNT as MESH_COUNT
 from ...splat_files import read_object
 from .. import LiftError
 from ..relief.canvas import bilinear
-from ..relief.colours import BLUR
+from ..relief.colours import BLUR, in_light
 from ..relief.lifter import TANGENT_SIGMA
 from .placement import Hints, Proposal, Registrar, Registration, register
 from .shown import Brim, brim_around, rest_picture, visibilities
@@ -129,10 +129,6 @@ def place_import(
 SURE = 0.5  # visibility of a Gaussian that tells something about the light
 OPAQUE = 0.95  # alpha of the matte, likewise
 LEAST = 12  # such Gaussians
-GAINS = 0.4, 2.5  # a larger change of exposure is no light but another colour
-OFFSET_PRIOR = 0.3  # x the evidence, for no veil
-TOGETHER = 0.05  # x the evidence, for an exposure that is the same in all channels
-ROUNDS, UNBELIEVED = 4, 0.12  # of the fit; sRGB beyond which a difference is not one of light
 GLANCE = 4.0  # what is seen at a glance only has the photo's colour all the same
 CARRIED = 0.10  # object units: how far what is left of the difference is carried on
 REACH = 0.28  # object units, beyond which less than 1/2000 of it is left: nothing is looked for
@@ -155,38 +151,12 @@ def recolored(lifted: LiftedObject, seen: F32, matte: Matte, camera: Camera) -> 
     own = lifted.gaussians.colors.astype(np.float64)
     if sure.sum() < LEAST:
         return lifted.gaussians.colors
-    lit = _in_light(own, own[sure], photo[sure])
+    lit = in_light(own, own[sure], photo[sure])
     points = lifted.gaussians.means.astype(np.float64)
     share = np.where(inside & (alpha > OPAQUE), np.minimum(GLANCE * seen, 1), 0.0)
     own_part = np.flatnonzero(share < 1)  # the rest is the photo's, whatever its light
     lit[own_part] += _carried_on(points[own_part], points[sure], (photo - lit)[sure])
     return np.clip(lit + share[:, None] * (photo - lit), 0, 1).astype(np.float32)
-
-
-def _in_light(colors: F64, own: F64, photo: F64) -> F64:
-    """`colors` (N, 3) under the exposures that make `own` (n, 3) most like `photo` (n, 3).
-
-    A channel that the object hardly has says nothing about the light: it follows the others.
-    """
-    result = np.empty_like(colors)
-    usual = float(np.clip((own * photo).sum() / max((own * own).sum(), 1e-9), *GAINS))
-    level = TOGETHER * float((own * own).mean()) + 1e-4
-    for c in range(3):
-        weight = np.ones(len(own))
-        gain, offset = 1.0, 0.0
-        for _ in range(ROUNDS):
-            total, x, y = weight.sum(), own[:, c], photo[:, c]
-            square = float((weight * x * x).sum()) + level * total
-            a = np.array([[square, (weight * x).sum()], [(weight * x).sum(), total]])
-            a[1, 1] += OFFSET_PRIOR * total
-            b = np.array([(weight * x * y).sum() + level * total * usual, (weight * y).sum()])
-            gain, offset = np.linalg.solve(a, b)
-            if not GAINS[0] <= gain <= GAINS[1]:
-                gain = float(np.clip(gain, *GAINS))
-                offset = float((weight * (y - gain * x)).sum() / ((1 + OFFSET_PRIOR) * total))
-            weight = 1 / (1 + ((gain * x + offset - y) / UNBELIEVED) ** 2)
-        result[:, c] = gain * colors[:, c] + offset
-    return np.clip(result, 0, 1)
 
 
 def _carried_on(points: F64, known: F64, rest: F64) -> F64:

@@ -285,3 +285,37 @@ def _gap(picture, settled, image, source, i, j, si, sj, enough):
         if total > most:
             return np.inf
     return total / count if count > 0 else 0.0
+
+
+# The light of one picture, in which the colours of another are seen.
+
+GAINS = 0.4, 2.5  # a larger change of exposure is no light but another colour
+OFFSET_PRIOR = 0.3  # x the evidence, for no veil
+TOGETHER = 0.05  # x the evidence, for an exposure that is the same in all channels
+ROUNDS, UNBELIEVED = 4, 0.12  # of the fit; sRGB beyond which a difference is not one of light
+
+
+def in_light(colors: F64, own: F64, photo: F64) -> F64:
+    """`colors` (N, 3) under the exposures that make `own` (n, 3) most like `photo` (n, 3).
+
+    A channel that the object hardly has says nothing about the light: it follows the others.
+    """
+    result = np.empty_like(colors)
+    usual = float(np.clip((own * photo).sum() / max((own * own).sum(), 1e-9), *GAINS))
+    level = TOGETHER * float((own * own).mean()) + 1e-4
+    for c in range(3):
+        weight = np.ones(len(own))
+        gain, offset = 1.0, 0.0
+        for _ in range(ROUNDS):
+            total, x, y = weight.sum(), own[:, c], photo[:, c]
+            square = float((weight * x * x).sum()) + level * total
+            a = np.array([[square, (weight * x).sum()], [(weight * x).sum(), total]])
+            a[1, 1] += OFFSET_PRIOR * total
+            b = np.array([(weight * x * y).sum() + level * total * usual, (weight * y).sum()])
+            gain, offset = np.linalg.solve(a, b)
+            if not GAINS[0] <= gain <= GAINS[1]:
+                gain = float(np.clip(gain, *GAINS))
+                offset = float((weight * (y - gain * x)).sum() / ((1 + OFFSET_PRIOR) * total))
+            weight = 1 / (1 + ((gain * x + offset - y) / UNBELIEVED) ** 2)
+        result[:, c] = gain * colors[:, c] + offset
+    return np.clip(result, 0, 1)

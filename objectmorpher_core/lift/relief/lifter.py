@@ -31,6 +31,7 @@ from .closing import closed
 from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow
+from .further_views import settled, with_views
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
 from .sides import with_sides
@@ -106,9 +107,10 @@ class ReliefLifter:
         is_carried = is_mirrored and hidden is None and body.behind is None
         lifted = replace(lifted, splatting="edged surface" if is_carried else "edged solid")
         progress(0.85, "Filling in its sides")
-        if body.behind is not None:  # what it hides has the colours of what is like it
-            return lifted
-        return with_sides(lifted, matte, camera, seed)
+        invents = body.behind is None  # else what it hides has the colours of what is like it
+        if settings.views:
+            return with_views(lifted, matte, camera, settings.views, seed, invents)
+        return with_sides(lifted, matte, camera, seed) if invents else lifted
 
     def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:
         """The shape alone, on which `lift` spreads its Gaussians."""
@@ -144,6 +146,9 @@ class ReliefLifter:
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)
+        if settings.views:
+            progress(0.2, "Comparing with its other photos")
+            body = settled(body, camera, settings.views)
         if settings.nearness is not None:
             body = body.nearer(_nearness(subject, settings.nearness, outline))
         return body

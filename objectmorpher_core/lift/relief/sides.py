@@ -27,7 +27,8 @@ from ...compose.plate.completion import complete, shrunk, smooth
 from ...compose.plate.patch_detail import with_detail
 from ...compose.plate.sources import Guide, PatchTone
 from ...compose.plate.structure_lines import find_lines
-from ...document.model import LiftedObject, Matte, Placement, Sides
+from ...document.model import LiftedObject, Matte, Placement
+from ...document.views import Sides
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats, projection_jacobians
 from ...raster.reference_layers import Picture3D
@@ -242,8 +243,8 @@ def _carried(
         left += pixels.shape[1] + GAP
     if not pictures:
         return lifted
-    where = (field.astype(np.float32) for field in (at, slopes, zoom))
-    return replace(lifted, sides=Sides(_side_by_side(pictures), *corner, *where))
+    at, slopes, zoom = (field.astype(np.float32) for field in (at, slopes, zoom))
+    return replace(lifted, sides=Sides(side_by_side(pictures), *corner, at, slopes, zoom))
 
 
 def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
@@ -281,7 +282,7 @@ def _is_seen(xy: F64, depth: F64, picture: _Picture, spacing: float) -> Mask:
     return depth < shown + 3 * spacing
 
 
-def _side_by_side(pictures: list[U8]) -> U8:
+def side_by_side(pictures: list[U8]) -> U8:
     height = max(len(picture) for picture in pictures)
     padded = [
         np.pad(picture, ((0, height - len(picture)), (0, GAP), (0, 0)), mode="edge")

@@ -1,0 +1,109 @@
+"""The sides of an object that its photo does not show: invented, or in further photos of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.arrays import F32, F64, U8, Mask, frozen
+from ..base.camera import Camera
+
+INSIDE = 128  # of 255: from this alpha on a pixel shows the object
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Invented pictures of the sides that a photo does not show, and where each Gaussian looks.
+
+    A Gaussian takes what it shows from there once it faces the camera so much more than it faced
+    the photo's that the photo would be stretched over it (`raster.rules`).
+    """
+
+    pixels: U8  # (h, w, 3) sRGB
+    left: int  # px of the photo, where the corner of the pixels lies in the object's texture
+    top: int
+    at: F32  # (N, 2) px of the photo: what each Gaussian's mean shows
+    slopes: F32  # (N, 2, 3) px per world unit at rest
+    zoom: F32  # (N,) px per world unit of the picture; 0: the Gaussian is on none
+    real: Mask | None = None  # (N,) whose picture is of a further photo; None: all are invented
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", frozen(self.pixels, np.uint8))
+        if self.real is not None:
+            object.__setattr__(self, "real", frozen(self.real, np.bool_))
+        for name in ("at", "slopes", "zoom"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
+
+    def select(self, index: np.ndarray) -> Sides:
+        """Of the Gaussians at `index` (integers or booleans)."""
+        real = None if self.real is None else self.real[index]
+        at, slopes, zoom = self.at[index], self.slopes[index], self.zoom[index]
+        return replace(self, at=at, slopes=slopes, zoom=zoom, real=real)
+
+    def followed_by(self, count: int) -> Sides:
+        """With `count` more Gaussians that are on none of the pictures."""
+        parts = (self.at, self.slopes, self.zoom)
+        at, slopes, zoom = (
+            np.concatenate([part, np.zeros((count, *part.shape[1:]), np.float32)]) for part in parts
+        )
+        real = None if self.real is None else np.pad(self.real, (0, count))
+        return replace(self, at=at, slopes=slopes, zoom=zoom, real=real)
+
+    def moved(self, offsets: np.ndarray, linear: np.ndarray | None = None) -> Sides:
+        """Of Gaussians that lie `offsets` (N, 3) world units aside, on the same surface.
+
+        `linear` (N, 3, 3): the surface itself was deformed so about each of them.
+        """
+        at, slopes = self.at, self.slopes.astype(np.float64)
+        if linear is not None:
+            slopes = slopes @ np.linalg.inv(linear)
+        at = at + np.einsum("nij,nj->ni", slopes, offsets)
+        return replace(self, at=at, slopes=slopes)
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherView:
+    """Another photo of an object: the object's cut-out, and where that photo's camera stood.
+
+    Its world is that of its own camera. How far away the object is there nobody knows: the pose is
+    a similarity.
+    """
+
+    photo: str  # file name without folder
+    camera: Camera  # of that photo
+    pose: F64  # (4, 4) that camera's world from the first photo's, the object at rest
+    left: int  # px of that photo, the cut-out's corner
+    top: int
+    pixels: U8  # (h, w, 3) sRGB, the object's own colours, continued beyond it
+    alpha: U8  # (h, w)
+    matches: F32  # (n, 4) px of the first photo, and of this one, that show the same detail
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", frozen(self.pose, np.float64))
+        object.__setattr__(self, "pixels", frozen(self.pixels, np.uint8))
+        object.__setattr__(self, "alpha", frozen(self.alpha, np.uint8))
+        object.__setattr__(self, "matches", frozen(self.matches, np.float32))
+
+    def check(self) -> None:
+        """Raises ValueError where its parts do not fit each other."""
+        if self.pose.shape != (4, 4) or np.linalg.det(self.pose[:3, :3]) <= 0:
+            raise ValueError("the pose of a further photo is none")
+        if self.pixels.shape != (*self.alpha.shape, 3) or not self.alpha.size:
+            raise ValueError(
+                f"a further photo is {self.pixels.shape}, its alpha {self.alpha.shape}"
+            )
+        if self.matches.ndim != 2 or self.matches.shape[1] != 4:
+            raise ValueError(f"matches with a further photo are {self.matches.shape}, not (n, 4)")
+        own = self.camera
+        if not own.focal > 0 or min(own.width, own.height) < 1:
+            raise ValueError("the camera of a further photo makes no sense")
+
+    @property
+    def mask(self) -> Mask:
+        """(h, w) of the cut-out, which pixels show the object."""
+        return np.asarray(self.alpha >= INSIDE)
+
+    def world_points(self, points: np.ndarray) -> F64:
+        """Points (..., 3) of the first photo's world in this camera's."""
+        return points @ self.pose[:3, :3].T + self.pose[:3, 3]
