@@ -419,6 +419,25 @@ def _lift(document: Document, k: int, script: EditScript, progress: Progress) ->
     return edits.set_lifted(document, k, *made)
 
 
+def other_photo(
+    path: Path,
+    at: tuple[float, float] | None = None,
+    backend: str = "auto",
+    progress: Progress = silent,
+    fov: float | None = None,
+    seed: int = 0,
+) -> OtherPhoto:
+    """Another photo's file with the thing seen `at` px there, else its main subject.
+
+    Raises InputError, ImageError, SelectionError, OSError.
+    """
+    opened = open_photo(read_input(path), path.name, fov, seed).photo
+    prompt = Prompt((Click(*at),)) if at else Prompt(is_subject=True)
+    reading = read_photo(opened.pixels, segment.load(backend), part(progress, 0.0, 0.7))
+    found = reading.segment(prompt, part(progress, 0.7, 1.0), seed).mask
+    return OtherPhoto(path.name, opened.pixels, opened.camera, found)
+
+
 def _lift_all_round(
     document: Document, k: int, script: EditScript, settings: LiftSettings, progress: Progress
 ) -> Document:
@@ -434,11 +453,9 @@ def _lift_all_round(
         step = part(progress, number / count, (number + 1) / count)
         path = Path(wanted.photo)
         try:
-            other = open_photo(read_input(path), path.name, script.fov, script.seed)
-            prompt = Prompt((Click(*wanted.at),)) if wanted.at else Prompt(is_subject=True)
-            reading = read_photo(other.photo.pixels, segment.load(script.segment), silent)
-            found = reading.segment(prompt, part(step, 0.0, 0.2), script.seed).mask
-            taken = OtherPhoto(path.name, other.photo.pixels, other.photo.camera, found)
+            taken = other_photo(
+                path, wanted.at, script.segment, part(step, 0.0, 0.2), script.fov, script.seed
+            )
             settings, lifted = with_photo(
                 subject, settings, lift.load(script.lift), taken, part(step, 0.2, 1.0), script.seed
             )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from editor_steps import CENTRE, wait_for_jobs
+from editor_steps import CENTRE, close_all, open_file, wait_for_jobs
 from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Painted, Selecting, ToolName
@@ -20,6 +20,7 @@ from objectmorpher_core.document.model import Document, LiftedObject, Placement
 from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import stroke
 from tests import shapes
+from tests.core.lift.registered import two_sides
 
 
 @pytest.fixture
@@ -235,5 +236,51 @@ def test_a_bad_file_is_a_sentence_and_nothing_is_lost(
     assert editor.document is document
 
 
+@pytest.fixture
+def lens(editor: Editor, tmp_path: Path) -> Iterator[Path]:
+    """A lens is lifted from one photo, and selected in another tab's; the file of that photo."""
+    for scene, name in zip(two_sides(), ("front.png", "side.png"), strict=True):
+        path = tmp_path / name
+        path.write_bytes(shapes.png(scene.pixels))
+        open_file(editor, path)
+        mask = tmp_path / "mask.png"
+        mask.write_bytes(shapes.mask_png(scene.mask))
+        editor.masking.open_file(mask)
+        wait_for_jobs(editor)
+    editor.tabs.go(editor.tabs.all[-2])
+    wait_for_jobs(editor)
+    run(editor, "lift")
+    wait_for_jobs(editor)
+    yield path
+    close_all(editor)
+
+
+def test_a_photo_from_another_side_is_a_step_that_can_be_undone(editor: Editor, lens: Path) -> None:
+    alone, chosen = editor.committed, editor.tabs.selected(lens)
+    assert chosen is not None, "it is open in a tab"
+    editor.shaping.add_photo(chosen)
+    wait_for_jobs(editor)
+    assert editor.message is None or not editor.message.is_error, editor.message
+    assert [view.photo for view in editor.shaping.settings.views] == ["side.png"]
+    sides = lifted_of(editor).sides
+    assert sides is not None and sides.real is not None and sides.real.any()
+    editor.shaping.drop_photo(0)
+    wait_for_jobs(editor)
+    assert not editor.shaping.settings.views
+    for _ in range(2):
+        run(editor, "undo")
+    assert editor.committed is alone
+
+
+def test_a_photo_of_something_else_changes_nothing(editor: Editor, ball: Document, lens: Path):
+    before = editor.committed
+    unlike = lens.with_name("unlike.png")
+    unlike.write_bytes(shapes.png(ball.photo.pixels))
+    editor.shaping.add_photo(unlike)
+    wait_for_jobs(editor)
+    assert editor.message is not None and editor.message.is_error
+    assert editor.committed is before
+
+
 def test_every_word_has_a_command_or_a_field() -> None:
-    assert {"import_shape", "fit_again", "clear_painted"} <= set(COMMANDS)
+    assert {"import_shape", "add_photo", "fit_again", "clear_painted"} <= set(COMMANDS)

@@ -143,6 +143,10 @@ def _nothing_left_out(editor: Editor) -> str | None:
     return no_lift(editor) or (None if is_any else t("Nothing beside it looks like a part of it"))
 
 
+def _no_photo_more(editor: Editor) -> str | None:
+    return no_lift(editor) or editor.shaping.why_no_photo
+
+
 def _not_a_file(editor: Editor) -> str | None:
     is_file = editor.shaping.why_fixed is not None
     return no_lift(editor) or (None if is_file else t("It was lifted from this photo"))
@@ -195,6 +199,9 @@ SELECT_COMMANDS: dict[str, Command] = {
     "export_mask": Command("Export mask…", "", asks_for(Dialog.MASK_SAVE), no_selection),
     "lift": Command("Lift object", "Ctrl+L", lambda e: e.tasks.lift(), cannot_lift),
     "import_shape": Command("Use a 3D file…", "", asks_for(Dialog.SHAPE_OPEN), no_selection),
+    "add_photo": Command(
+        "Add a photo from another side…", "", asks_for(Dialog.VIEW_OPEN), _no_photo_more
+    ),
     "fit_again": Command("Fit to the photo", "", lambda e: e.shaping.fit_again(), _not_a_file),
     "clear_painted": Command(
         "Clear what is painted", "", lambda e: e.shaping.clear_painted(), _nothing_painted

@@ -93,6 +93,7 @@ class Editor(EditorState):
             Dialog.MASK_OPEN: self.masking.open_file,
             Dialog.MASK_SAVE: self.masking.write_file,
             Dialog.SHAPE_OPEN: self.shaping.open_file,
+            Dialog.VIEW_OPEN: lambda path: self.shaping.add_photo(self.tabs.selected(path) or path),
             Dialog.MODEL_OPEN: self.models.add,
             Dialog.MODEL_FOLDER: self.models.hub.use_folder,
             Dialog.PROFILE_OPEN: self.looking.use_profile,

@@ -44,6 +44,7 @@ class Dialog(Enum):
     MASK_OPEN = "Import mask"
     MASK_SAVE = "Export mask"
     SHAPE_OPEN = "Use 3D file"
+    VIEW_OPEN = "Add photo"
     MODEL_OPEN = "Use depth model"
     MODEL_FOLDER = "Use the model in a folder"
     PROFILE_OPEN = "Use colour profile"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.document.model import Document
@@ -12,6 +13,8 @@ from ..system.texts import t
 from .tab import Tab
 
 if TYPE_CHECKING:
+    from objectmorpher_core.lift.registration.further import OtherPhoto
+
     from .autosave import Autosave
     from .intents.posing import Posing
     from .state import EditorState
@@ -44,6 +47,19 @@ class Tabs:
             self.add()
         self._start(document, shapes)
         self._share_memory()
+
+    def selected(self, path: Path) -> OtherPhoto | None:
+        """A photo's file as a tab shows it, with the last object that is selected there."""
+        from objectmorpher_core.lift.registration.further import OtherPhoto
+
+        for tab in self.all:
+            if (document := tab.document) is None or tab.source != path:
+                continue
+            chosen = [item for item in document.objects if item.selection is not None]
+            if chosen and (mask := chosen[-1].selection) is not None:
+                photo = document.photo
+                return OtherPhoto(photo.name, photo.pixels, photo.camera, mask)
+        return None
 
     def add(self) -> None:
         """The start screen in a new tab, beside the one that is shown."""

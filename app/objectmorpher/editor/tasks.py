@@ -38,6 +38,7 @@ from .view import Action, SelectMode, ToolName
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
+    from objectmorpher_core.lift.registration.further import OtherPhoto
 
     from .intents.posing import Posing
     from .state import EditorState
@@ -212,6 +213,39 @@ class Tasks:
             title, job_functions.lift,
             Cut(photo.pixels, photo.camera, thing.selection, thing.mixed),
             BackendChoice(settings.backends.lift, document.seed), wanted,
+            done=accept, failed=editor.complain_of, kind=LIFT,
+        )  # fmt: skip
+
+    def lift_with(self, other: Path | OtherPhoto, label: str) -> None:
+        """Asks for the current object lifted with another photo of it, too; one step."""
+        editor, document = self._editor, self._editor.document
+        thing, k = editor.object, editor.current
+        if document is None or thing is None or thing.selection is None:
+            return
+        editor.message = None
+        photo, settings, mask = document.photo, editor.settings, thing.mask
+        shape = replace(thing.shape, count=settings.gaussians, horizon=document.horizon)
+        title = t("Comparing with {name}", name=other.name)
+
+        def accept(answer: tuple[LiftSettings, Matte, LiftedObject]) -> None:
+            def changed(now: Document) -> Document | None:
+                if k >= len(now.objects) or now.objects[k].mask is not mask:
+                    return None
+                wanted, matte, lifted = answer
+                return edits.reshape(now, k, matte, lifted, wanted)
+
+            self.make_ready(k, changed, title, show)
+
+        def show(now: Document) -> None:
+            if not editor.hand.is_busy:
+                self._posing.select(None)
+                editor.apply(label, editor.derived.solved(now, k, None))
+
+        choice = BackendChoice(settings.backends.lift, document.seed)
+        editor.jobs.start(
+            title, job_functions.lift_with_photo,
+            Cut(photo.pixels, photo.camera, thing.selection, thing.mixed), other,
+            (settings.backends.segment, choice), shape,
             done=accept, failed=editor.complain_of, kind=LIFT,
         )  # fmt: skip
 

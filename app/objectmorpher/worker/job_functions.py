@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.document.gaussians import Gaussians
     from objectmorpher_core.document.settings import Refined, Shadow
     from objectmorpher_core.lift.refitting import Background, Lifted, Refitted
+    from objectmorpher_core.lift.registration.further import OtherPhoto
     from objectmorpher_core.lift.registration.imported import Import, ImportTarget
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
@@ -160,6 +161,36 @@ def lift(
     progress(0.95, "getting ready to pose")
     rehearse_lift(matte, lifted, cut.camera)  # seconds, once
     return matte, lifted
+
+
+def lift_with_photo(
+    cut: Cut, other: Path | OtherPhoto, chosen: tuple[str, BackendChoice], shape: LiftSettings,
+    progress: Progress,
+) -> tuple[LiftSettings, Matte, LiftedObject]:  # fmt: skip
+    """The masked object lifted with another photo of it, too, and the settings that say so.
+
+    Of a file it is the main subject. `chosen`: the segmenter, and the lifter.
+    """
+    from objectmorpher_core.lift import LiftSubject, load
+    from objectmorpher_core.lift.registration.further import with_photo
+    from objectmorpher_core.pictures.image import ImageError
+    from objectmorpher_core.pipeline import other_photo
+    from objectmorpher_core.segment.mask_edit import is_selected
+    from objectmorpher_core.segment.matting.matte import cut_out
+
+    segmenter, choice = chosen
+    if isinstance(other, Path):
+        try:
+            other = other_photo(other, None, segmenter, part(progress, 0.0, 0.2), None, choice.seed)
+        except OSError as error:
+            raise ImageError(f"{other.name} cannot be opened: {error.strerror or error}") from error
+    matte = cut_out(cut.pixels, cut.mask, cut.mixed)
+    subject = LiftSubject(cut.pixels, cut.camera, is_selected(cut.mask), matte)
+    settings, lifted = with_photo(
+        subject, shape, load(choice.backend), other, part(progress, 0.2, 0.95), choice.seed
+    )
+    rehearse_lift(matte, lifted, cut.camera)
+    return settings, matte, lifted
 
 
 def refit(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import cv2
@@ -185,3 +185,27 @@ def turn_error(found: F64, true: F64) -> float:
     turns = [m[:3, :3] / np.cbrt(np.linalg.det(m[:3, :3])) for m in (found, true)]
     cosine = (np.trace(turns[0].T @ turns[1]) - 1) / 2
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+
+
+LENS_CAMERA = Camera.from_fov(480, 360, 45)
+AWAY = 2.4  # object units
+TURN = 35.0  # degrees between the photos of the lens
+
+
+def turned(degrees: float) -> F64:
+    """(4, 4) about an upright axis through a thing at the usual distance."""
+    angle, matrix = np.radians(degrees), np.eye(4)
+    matrix[0, 0] = matrix[2, 2] = np.cos(angle)
+    matrix[0, 2], matrix[2, 0] = np.sin(angle), -np.sin(angle)
+    matrix[:3, 3] = [0, 0, AWAY] - matrix[:3, :3] @ [0, 0, AWAY]
+    return matrix
+
+
+@cache
+def two_sides() -> tuple[Scene, Scene]:
+    """A patterned lens, much flatter than its outline suggests, and it from a side by `TURN`."""
+    round_one, radii = ball(is_patterned=True), np.array([1.0, 0.8, 0.35])
+    lens = replace(round_one, cast=lambda start, ways: round_one.cast(start / radii, ways / radii))
+    first = np.eye(4)
+    first[:3, 3] = [0, 0, AWAY]
+    return photo(lens, first, LENS_CAMERA), photo(lens, turned(TURN) @ first, LENS_CAMERA)

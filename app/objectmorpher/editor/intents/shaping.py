@@ -17,6 +17,7 @@ from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.base.brush import Brush, Stroke
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.bounds import MOST_VIEWS
 from objectmorpher_core.document.model import (
     AS_SEEN,
     Document,
@@ -32,6 +33,7 @@ from ...worker import job_functions
 from ..view import Painted
 
 if TYPE_CHECKING:
+    from objectmorpher_core.lift.registration.further import OtherPhoto
     from objectmorpher_core.lift.registration.imported import Import, ImportTarget
     from objectmorpher_core.lift.registration.placement import Proposal
 
@@ -235,6 +237,30 @@ class Shaping:
         rgba = np.dstack([ink * strength, 255 * strength]).astype(np.uint8)
         box = (0.0, 0.0, float(shape[0] * GRAIN), float(shape[1] * GRAIN))
         return CanvasLayer(box, rgba, is_coarse=True, is_tint=True)
+
+    # Other photos of the object
+
+    @property
+    def why_no_photo(self) -> str | None:
+        """Why no other photo can be added, or None."""
+        if len(self.settings.views) >= MOST_VIEWS:
+            return t("An object has {count} further photos at most", count=MOST_VIEWS)
+        return self.why_fixed
+
+    def add_photo(self, other: Path | OtherPhoto) -> None:
+        """Another photo of the current object; of a file its main subject."""
+        editor = self._editor
+        if not editor.is_lifted:
+            editor.say(t("Lift an object first"))
+        elif (reason := self.why_no_photo) is not None:
+            editor.say(reason)
+        else:
+            self._tasks.lift_with(other, t("Add photo"))
+
+    def drop_photo(self, number: int) -> None:
+        """The object is as it was without that photo; one step."""
+        views = self.settings.views
+        self.say(t("Remove photo"), views=(*views[:number], *views[number + 1 :]))
 
     # Objects out of files
 

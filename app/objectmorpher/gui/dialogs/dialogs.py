@@ -32,6 +32,7 @@ FILTERS = {
     Dialog.MASK_OPEN: PHOTO_ENDINGS,
     Dialog.MASK_SAVE: (".png",),
     Dialog.SHAPE_OPEN: OBJECT_ENDINGS,
+    Dialog.VIEW_OPEN: PHOTO_ENDINGS,
     Dialog.MODEL_OPEN: (MODEL_ENDING,),
     Dialog.MODEL_FOLDER: GIVEN,
     Dialog.PROFILE_OPEN: (".icc", ".icm"),

@@ -22,6 +22,7 @@ from ..widgets.widgets import (
     fill_row,
     gap,
     heading,
+    icon_button,
     note,
     number_field,
     small_text,
@@ -114,6 +115,7 @@ def draw_shape(editor: Editor) -> None:
         _draw_symmetry(editor)
         _draw_standing(editor)
         _draw_depth(editor)
+        _draw_photos(editor)
     else:
         note(f"{reason}.")
         _draw_poses(editor)
@@ -208,6 +210,23 @@ def _draw_depth(editor: Editor) -> None:
     tooltip(t("Its front is as deep as the model sees it; what you painted is added to that"))
     if chosen != uses_depth:
         editor.shaping.say(t("Depth model"), uses_depth=chosen)
+
+
+def _draw_photos(editor: Editor) -> None:
+    """Other photos of the object, from which its shape and its sides are known."""
+    note(t("Photos from other sides"))
+    for number, view in enumerate(editor.shaping.settings.views):
+        imgui.push_id(number)
+        if icon_button(Icon.CLOSE, "drop", t("Remove this photo")):
+            editor.shaping.drop_photo(number)
+        imgui.pop_id()
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(view.photo)
+    label = t(COMMANDS["add_photo"].label)
+    command_button(editor, "add_photo", f"{Icon.IMAGE}  {label}")
+    if why_not(editor, "add_photo") is None:
+        tooltip(t("The main subject of that photo, or what is selected where it is open in a tab"))
 
 
 def _draw_poses(editor: Editor) -> None:
