@@ -16,6 +16,7 @@ import trimesh
 from objectmorpher.cli import parser as cli
 from objectmorpher_core import pipeline
 from objectmorpher_core.pictures.image import read_picture
+from tests.core.lift.registered import two_sides
 from tests.photos import outlined
 
 pytestmark = pytest.mark.usefixtures("lifted_once")
@@ -57,6 +58,8 @@ def _laid_out(folder: Path) -> None:
     yellow = np.clip(1.2 - np.hypot(x - 140, y - 95) / 130, 0.2, 1)[..., None] * (50, 170, 220)
     duck = np.where(round_[..., None], yellow, np.repeat(grey[..., None], 3, 2))
     cv2.imwrite(str(folder / "duck.jpg"), duck.clip(0, 255).astype(np.uint8))
+    for scene, name in zip(two_sides(), ("front.jpg", "side.jpg"), strict=True):
+        cv2.imwrite(str(folder / name), scene.pixels[..., ::-1])
     (folder / "two-flowers.json").write_text(json.dumps(TWO))
     many = (ROOT / "docs" / "howto" / "many.md").read_text("utf-8")
     script = re.search(r"```json\n(.*?)```", many, re.S)

@@ -16,7 +16,7 @@ from .resources import resource
 FIRST = "tutorial"  # the page that is read first
 ORDER = (  # of docs/howto
     "select", "bend", "place", "behind", "remove", "export", "share", "photos", "many", "splats",
-    "offline", "accessibility", "trouble",
+    "sides", "offline", "accessibility", "trouble",
 )  # fmt: skip
 PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)(\{[^}]*\})?")
 LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import F64
+from objectmorpher_research.training.shapes import materials
 from objectmorpher_research.training.shapes.distance import distance, lowest, trace
 from objectmorpher_research.training.shapes.families import FAMILIES
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
@@ -241,3 +242,13 @@ def test_a_flat_ellipsoid_is_as_thick_as_it_is() -> None:
     out = _trace(solid, places, np.array([0.0, 0, -1]))
     thick = 2 * half[2] * np.sqrt(1 - x**2 - y**2)
     np.testing.assert_allclose(out[:, 1] - out[:, 0], thick, atol=1.5e-3)
+
+
+def test_a_picture_is_looked_up_at_more_places_than_opencv_takes_at_once():
+    """A flat thing that fills its crop shows its picture in 66,000 pixels."""
+    rng = np.random.default_rng(0)
+    picture = rng.random((20, 30, 3)).astype(np.float32)
+    at = rng.uniform(-3, 3, (70_000, 2))
+    whole = materials._looked_up(picture, at)
+    parts = [materials._looked_up(picture, at[k : k + 1000]) for k in range(0, len(at), 1000)]
+    assert np.array_equal(whole, np.concatenate(parts))

@@ -10,6 +10,8 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64
 
+from ...evaluation.truth.lookup import looked_up
+
 PLAIN, PHOTO, GRAIN, STRIPES, CHECKS, PRINT, SPOTS, FACE = range(8)
 WEIGHTS = (0.22, 0.27, 0.17, 0.09, 0.05, 0.12, 0.08)  # how often each but the last is chosen
 SMALLEST_CROP = 90  # px of a photograph
@@ -183,10 +185,8 @@ def _looked_up(picture: F32, uv: F64) -> F64:
     """(n, 3) of a picture that goes on mirrored; y up."""
     height, width = picture.shape[:2]
     folded = np.abs((uv + 1) % 2 - 1)
-    x = (folded[:, 0] * (width - 1)).astype(np.float32)
-    y = ((1 - folded[:, 1]) * (height - 1)).astype(np.float32)
-    found = cv2.remap(picture, x[None], y[None], cv2.INTER_LINEAR)
-    return np.asarray(found[0], np.float64)
+    at = np.column_stack([folded[:, 0] * (width - 1), (1 - folded[:, 1]) * (height - 1)])
+    return looked_up(picture, at)
 
 
 def _ramp(value: F64, low: float, high: float) -> F64:
