@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from ...base.arrays import F32, F64, I64, Mask
 from ...base.camera import Camera
 from ...base.pixels import unit_pixels
+from ...base.poisson_disk import nearest_in
 from ...document.model import LiftedObject, Matte
 from ...document.views import FurtherView, Sides
 from ...raster.posed import RestSplats, projection_jacobians
@@ -29,7 +30,7 @@ from ..registration.shown import rest_picture, visibilities
 from .body import ReliefBody
 from .canvas import bilinear
 from .colours import in_light
-from .sides import APART, GAP, side_by_side, with_sides
+from .sides import GAP, side_by_side, with_sides
 
 REACH = 0.9  # x extent, to either side of a front, where it is looked for
 STEPS = 97  # places there
@@ -37,6 +38,7 @@ BESIDE = 0.012  # x the object's size in a further photo, by which a silhouette 
 FARTHEST = 0.3  # x extent, by which a surface moves: what would have to move more is another one
 SPREAD = 0.02  # x extent, over which a surface follows a silhouette
 ROUNDS = 8  # in which it does
+HELD = 0.25  # weight of what need not move beside what must: a narrow rim stays with the rest
 APART_PX = 0.02  # x the object's size there, by which two lines of sight may miss each other
 UNLIKE = 0.08  # x extent, by which it may differ from what the details around say
 AROUND = 6  # of those
@@ -47,6 +49,7 @@ LEAST = 12  # Gaussians that two photos show, of which the light is found
 WELL = 0.4  # cosine with the line of sight, from which a Gaussian's colours are compared
 FACING = 0.25  # cosine, from which a further photo's picture of it is carried
 SEEN = 0.5  # visibility there
+BETWEEN = 6.0  # x spacing, between Gaussians on that and on an invented picture: twice their reach
 
 
 def settled(body: ReliefBody, camera: Camera, views: Sequence[FurtherView]) -> ReliefBody:
@@ -104,8 +107,8 @@ class _Rays:
         middle = 0.5 * (2 * front - share * thickness)
         middle += share * (body.middle - 0.5 * (2 * (body.middle + halves[0] + extra) - thickness))
         change = np.where(self.inside, middle - body.middle, 0.0)
-        beyond = self._spread(change, np.ones(change.shape), 2 * SPREAD)
-        middle = body.middle + np.where(self.inside, change, beyond)
+        # Beyond the outline as at it: there the sheet is continued by its slope.
+        middle = body.middle + change.ravel()[nearest_in(self.inside)]
         whole = self.inside.astype(np.float64)
         return replace(
             body, middle=middle,
@@ -142,7 +145,7 @@ class _Rays:
             is_any &= np.abs(grid[nearest]) < FARTHEST * self.extent
             lacking = np.where(is_any, grid[nearest] - moved, 0.0)
             lacking = np.where(np.abs(lacking) < 0.5 * (grid[1] - grid[0]), 0.0, lacking)
-            moved += self._spread(lacking, 0.25 + 0.75 * (lacking != 0), SPREAD)
+            moved += self._spread(lacking, np.where(lacking != 0, 1.0, HELD), SPREAD)
         return moved
 
     def _spread(self, field: F64, weight: F64, width: float) -> F64:
@@ -272,7 +275,7 @@ class _Shown:
             pictures, left = [sides.pixels, picture], sides.left + sides.pixels.shape[1] + GAP
         at, slopes, zoom = sides.at.copy(), sides.slopes.copy(), sides.zoom.copy()
         # No pixel shows two pictures at once: a mean of places in both would be in neither.
-        places, gap = lifted.gaussians.means, APART * lifted.spacing
+        places, gap = lifted.gaussians.means, BETWEEN * lifted.spacing
         is_near = np.isfinite(KDTree(places[own]).query(places, distance_upper_bound=gap)[0])
         zoom[is_near & ~self.is_better] = 0
         at[own] = self.spots[own] + [left, sides.top]
