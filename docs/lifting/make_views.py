@@ -7,8 +7,11 @@ With names, only their rows are printed.
 
 from __future__ import annotations
 
+import os
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 
 import cv2
@@ -145,12 +148,13 @@ def main() -> None:
     names = sys.argv[1:]
     meshes = fetched()
     rows, sheets = [], []
-    for name in names or (*SOLIDS, *HELD_OUT):
-        for row, sheet in measured(name, meshes):
-            print(row, flush=True)
-            rows.append(row)
-            if sheet is not None and name in PICTURED and row.yaw == VIEWS[1]:
-                sheets.append(sheet)
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        for found in pool.map(measured, names or (*SOLIDS, *HELD_OUT), repeat(meshes)):
+            for row, sheet in found:
+                print(row, flush=True)
+                rows.append(row)
+                if sheet is not None and row.name in PICTURED and row.yaw == VIEWS[1]:
+                    sheets.append(sheet)
     if names:
         return
     text = HEAD.format(views=" and ".join(f"{v:.0f}" for v in VIEWS))

@@ -17,10 +17,10 @@ from objectmorpher_core import splat_files
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftedObject, Placement
+from objectmorpher_core.segment.mask_edit import is_selected
 from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import stroke
 from tests import shapes
-from tests.core.lift.registered import two_sides
 
 
 @pytest.fixture
@@ -236,50 +236,24 @@ def test_a_bad_file_is_a_sentence_and_nothing_is_lost(
     assert editor.document is document
 
 
-@pytest.fixture
-def lens(editor: Editor, tmp_path: Path) -> Iterator[Path]:
-    """A lens is lifted from one photo, and selected in another tab's; the file of that photo."""
-    for scene, name in zip(two_sides(), ("front.png", "side.png"), strict=True):
-        path = tmp_path / name
-        path.write_bytes(shapes.png(scene.pixels))
-        open_file(editor, path)
-        mask = tmp_path / "mask.png"
-        mask.write_bytes(shapes.mask_png(scene.mask))
-        editor.masking.open_file(mask)
-        wait_for_jobs(editor)
-    editor.tabs.go(editor.tabs.all[-2])
+def test_another_photo_is_what_is_selected_where_it_is_open_in_a_tab(
+    editor: Editor, ball: Document, tmp_path: Path
+) -> None:
+    editor.start(ball)
+    other = tmp_path / "side.png"
+    other.write_bytes(ball.photo.source)
+    assert editor.tabs.selected(other) is None
+    assert why_not(editor, "add_photo") is None
+    open_file(editor, other)
+    assert editor.tabs.selected(other) is None, "nothing is selected there"
+    assert why_not(editor, "add_photo") is not None, "nothing is lifted there"
+    editor.selection.add_click(*CENTRE, True)
     wait_for_jobs(editor)
-    run(editor, "lift")
-    wait_for_jobs(editor)
-    yield path
+    chosen = editor.tabs.selected(other)
+    assert chosen is not None and chosen.name == "side.png"
+    assert np.array_equal(chosen.pixels, ball.photo.pixels)
+    assert is_selected(chosen.mask)[int(CENTRE[1]), int(CENTRE[0])]
     close_all(editor)
-
-
-def test_a_photo_from_another_side_is_a_step_that_can_be_undone(editor: Editor, lens: Path) -> None:
-    alone, chosen = editor.committed, editor.tabs.selected(lens)
-    assert chosen is not None, "it is open in a tab"
-    editor.shaping.add_photo(chosen)
-    wait_for_jobs(editor)
-    assert editor.message is None or not editor.message.is_error, editor.message
-    assert [view.photo for view in editor.shaping.settings.views] == ["side.png"]
-    sides = lifted_of(editor).sides
-    assert sides is not None and sides.real is not None and sides.real.any()
-    editor.shaping.drop_photo(0)
-    wait_for_jobs(editor)
-    assert not editor.shaping.settings.views
-    for _ in range(2):
-        run(editor, "undo")
-    assert editor.committed is alone
-
-
-def test_a_photo_of_something_else_changes_nothing(editor: Editor, ball: Document, lens: Path):
-    before = editor.committed
-    unlike = lens.with_name("unlike.png")
-    unlike.write_bytes(shapes.png(ball.photo.pixels))
-    editor.shaping.add_photo(unlike)
-    wait_for_jobs(editor)
-    assert editor.message is not None and editor.message.is_error
-    assert editor.committed is before
 
 
 def test_every_word_has_a_command_or_a_field() -> None:

@@ -49,8 +49,8 @@ def test_the_servers_backends_are_offered_and_those_here_when_it_is_gone(
     computing.set_address("{}:{}".format(*desk.front.address))
     wait(lambda: methods.taken("lift") == "trellis")
     why_not = {method.name: method.why_not for method in methods.of("lift")}
-    assert list(why_not) == ["auto", "relief", "trellis", "cupid", "sam3d"]
-    assert [name for name, reason in why_not.items() if reason] == ["cupid"]
+    assert list(why_not) == ["auto", "relief", "trellis", "cupid", "triposplat", "sam3d"]
+    assert [name for name, reason in why_not.items() if reason] == ["cupid", "triposplat"]
     assert methods.taken("inpaint") == "lama"
     assert methods.why_not("refine") == "The server has no network for it"
     methods.choose("lift", "sam3d")

@@ -194,5 +194,5 @@ def test_arguments_are_never_read_by_a_shell(folder, subject, tmp_path):
 
 def test_an_unknown_lifter_names_the_workers(folder):
     install(folder, "")
-    with pytest.raises(LiftError, match="known are relief, trellis, cupid, mine"):
+    with pytest.raises(LiftError, match="known are relief, trellis, cupid, triposplat, mine"):
         lift.load("other")
