@@ -64,9 +64,8 @@ def test_where_the_other_photo_was_taken():
     view = lifted()[2]
     turn = view.pose[:3, :3] / np.cbrt(np.linalg.det(view.pose[:3, :3]))
     off = turn @ turned(TURN)[:3, :3].T
-    assert (
-        np.degrees(np.arccos((np.trace(off) - 1) / 2)) < 15
-    )  # flatter and turned less far looks nearly the same
+    # A flatter thing that is turned less far looks nearly the same.
+    assert np.degrees(np.arccos((np.trace(off) - 1) / 2)) < 15
 
 
 def test_from_there_it_looks_as_in_the_other_photo():
@@ -79,7 +78,7 @@ def test_from_there_it_looks_as_in_the_other_photo():
         inside = covered & true.mask
         overlaps.append(inside.sum() / (covered | true.mask).sum())
         errors.append(np.abs(drawn.color[inside] - true.pixels[inside] / 255).mean())
-    assert overlaps[1] > 0.93 and 1 - overlaps[1] < 0.6 * (1 - overlaps[0])
+    assert overlaps[1] > 0.95 and 1 - overlaps[1] < 0.7 * (1 - overlaps[0])
     assert errors[1] < 0.6 * errors[0]
 
 
