@@ -106,16 +106,6 @@ def _device() -> str:
     return name if free is None else f"{name}, {free / 2**30:.1f} GB free"
 
 
-def _has_gpu() -> bool:
-    """Whether PyTorch is there and would use one."""
-    if not device.has_torch():
-        return False
-    try:
-        return device.devices()[0] != "cpu"
-    except models.ModelError:
-        return False
-
-
 def _selecting() -> StageReport:
     absent = backends.absent(segment.BACKENDS)
     chosen = segment.load("auto")
@@ -158,7 +148,7 @@ def _lifting() -> StageReport:
         better += f" after `{models.EXTRA}`, or `objectmorpher models add depth FILE.onnx`"
     if not has_shape:
         better = "`objectmorpher models get dinov2-vits14`, for our shape network"
-    if _has_gpu() and "trellis" in dict(absent):
+    if device.has_gpu() and "trellis" in dict(absent):
         better += "; " if better else ""
         better += "to make up what the photo does not show: " + " and ".join(
             f"`objectmorpher models get {id}`" for id in (configs.TRELLIS, configs.ENCODER)
@@ -189,7 +179,7 @@ def _filling() -> StageReport:
     chosen = compose.load("auto").name
     if chosen != "patchmatch":
         better = ""
-        if chosen in ("lama", "migan") and _has_gpu():
+        if chosen in ("lama", "migan") and device.has_gpu():
             better = "`objectmorpher models get pixelhacker`, for this GPU"
         return StageReport(
             "background", chosen, "the first of its stage that can run here", absent, better
@@ -210,7 +200,7 @@ def _harmonising() -> StageReport:
     )
     if better and not device.has_torch():
         better = f"`{models.EXTRA}`, then {better}"
-    if better and not _has_gpu():  # hours a picture without one
+    if better and not device.has_gpu():  # hours a picture without one
         better = f"a GPU of 12 GB, here or in a server (docs/serve.md): {better}"
     why = f"unless it is asked for by its name: {', '.join(others)}"
     return StageReport("refine", "none", why, absent, better)

@@ -38,8 +38,8 @@ from .document.model import (
     Prompt,
 )
 from .document.settings import Hint
-from .lift.registration.further import OtherPhoto, with_photo
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
+from .lift.registration.other_photo import OtherPhoto, with_photo
 from .lift.relief.depth_look import look_at_all
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
 from .raster.posed import PosedSplats

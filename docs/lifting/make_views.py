@@ -27,7 +27,7 @@ from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import DeformSettings, LiftedObject, Matte, Placement
 from objectmorpher_core.lift import LiftError, LiftSubject
-from objectmorpher_core.lift.registration.further import OtherPhoto, with_photo
+from objectmorpher_core.lift.registration.other_photo import OtherPhoto, with_photo
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.segment.matting.matte import cut_out
 

@@ -18,14 +18,13 @@ from ..base.arrays import F32, F64, I32, U8, Mask, Pixels, Selection, frozen
 from ..base.camera import Camera
 from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
-from .alike import is_shown_alike
-from .bounds import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
+from .bounds import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS, MOST_VIEWS
 from .gaussians import Gaussians
 from .paint import Paint
 from .pose import UNHELD, Base, Handle, Pose
 from .rig import Rig
 from .settings import AS_IN_THE_PHOTO, Finish, Hint, Refined, Shadow
-from .views import FurtherView, Sides
+from .sides import FurtherView, Sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +181,8 @@ class LiftSettings:
             )
         if not 0.0 <= self.trust <= 1.0:
             raise ValueError(f"a trust of {self.trust:g} is not between 0 and 1")
+        if len(self.views) > MOST_VIEWS:
+            raise ValueError(f"{len(self.views)} further photos are more than {MOST_VIEWS}")
         if self.hidden is not None:
             object.__setattr__(self, "hidden", frozen(self.hidden, np.bool_))
         if self.nearness is not None:
@@ -549,3 +550,33 @@ class Document:
         """Records which backend of a stage made what the document holds."""
         others = tuple((s, n) for s, n in self.backends if s != stage)
         return replace(self, backends=(*others, (stage, name)))
+
+
+# Whether two edits look the same: then a refinement of one is one of the other, too.
+#
+# Of an object, what its picture depends on; what else changes leaves a refinement as it is.
+SHOWN = (
+    "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
+    "harmony", "relight", "grain", "defocus", "stays_in_front", "finish", "seen_from",
+)  # fmt: skip
+
+
+def is_shown_alike(one: EditObject, other: EditObject) -> bool:
+    """Whether two objects look the same; arrays do only where they are one and the same."""
+
+    def is_same(a: object, b: object) -> bool:
+        is_plain = not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray)
+        return a is b or (is_plain and a == b)
+
+    return all(is_same(getattr(one, name), getattr(other, name)) for name in SHOWN)
+
+
+def show_the_same(one: Document, other: Document) -> bool:
+    """Whether a refinement of one edit is one of the other, too."""
+    if one.photo is not other.photo or one.plate is not other.plate:
+        return False
+    if (one.horizon, one.feather) != (other.horizon, other.feather):
+        return False
+    if one.depth is not other.depth or len(one.objects) != len(other.objects):
+        return False
+    return all(map(is_shown_alike, one.objects, other.objects))

@@ -36,7 +36,7 @@ from ..document.model import (
 )
 from ..document.paint import Paint
 from ..document.pose import Base, Pose
-from ..document.views import Sides
+from ..document.sides import Sides
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width, cut_out
 from . import LiftError, LiftSubject, load

@@ -45,6 +45,14 @@ def devices() -> tuple[Device, ...]:
     return tuple(d for d in found if d == wanted) if wanted else tuple(found)
 
 
+def has_gpu() -> bool:
+    """Whether PyTorch is installed and would use one. Imports torch."""
+    try:
+        return has_torch() and devices()[0] != "cpu"
+    except ModelError:
+        return False
+
+
 def total_memory() -> int:
     """Bytes of main memory; what is free where nobody can tell."""
     if sys.platform != "win32":

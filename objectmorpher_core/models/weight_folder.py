@@ -128,7 +128,7 @@ def _latent(family: str, at: Path, names: list[str]) -> tuple[str, ...]:
     absent = [name for name in codec if not (at / name).is_file()]
     lacks = [("network", not own), (CODEC, bool(absent))]
     is_short = any(is_absent and part in LATENT[family] for part, is_absent in lacks)
-    if is_short and any(at.glob(f"*{PICKLED[0]}")) | any(at.glob(f"*/*{PICKLED[0]}")):
+    if is_short and (any(at.glob(f"*{PICKLED[0]}")) or any(at.glob(f"*/*{PICKLED[0]}"))):
         raise ModelError(
             f"{at.name} holds only pickled weights, which can run any code: to take nothing but"
             f" their numbers, objectmorpher models add {family} FOLDER --convert"

@@ -69,6 +69,10 @@ class MoreView:
     at: XY | None = None  # px, on the object there; None: that photo's main subject
 
 
+Read = Callable[[str, Any], Any]
+"""What checks an option's value, by the option's name; raises ScriptError."""
+
+
 def _number(key: str, value: Any) -> float:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not -MOST_NUMBER <= value <= MOST_NUMBER:  # NaN compares false
@@ -86,16 +90,16 @@ def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
     return parse
 
 
-def _points(key: str, value: Any) -> tuple[tuple[float, ...], ...]:
-    if not isinstance(value, list | tuple):
-        raise ScriptError(f"{key}: {shown(value)} is not a list of points")
-    return tuple(_numbers(2, 2)(key, v) for v in value)
+def _several(what: str, read: Read, most: int | None = None) -> Read:
+    """Read a list of what `read` takes; `what`: they are called."""
+    called = what if most is None else f"at most {most} {what}"
 
+    def parse(key: str, value: Any) -> tuple[Any, ...]:
+        if not isinstance(value, list | tuple) or (most is not None and len(value) > most):
+            raise ScriptError(f"{key}: {shown(value)} is not a list of {called}")
+        return tuple(read(key, each) for each in value)
 
-def _handles(key: str, value: Any) -> tuple[HandleMove, ...]:
-    if not isinstance(value, list | tuple):
-        raise ScriptError(f"{key}: {shown(value)} is not a list of handles")
-    return tuple(_handle(key, v) for v in value)
+    return parse
 
 
 def _handle(key: str, value: Any) -> HandleMove:
@@ -105,12 +109,6 @@ def _handle(key: str, value: Any) -> HandleMove:
         raise ScriptError(f'{key}: {shown(value)} is not {{"at": [x, y], "to": [x, y], "dz": d}}')
     at, to = (_numbers(2, 2)(key, value[end]) for end in ("at", "to"))
     return HandleMove((at[0], at[1]), (to[0], to[1]), _number(key, value.get("dz", 0.0)))
-
-
-def _sources(key: str, value: Any) -> tuple[FillFrom, ...]:
-    if not isinstance(value, list | tuple):
-        raise ScriptError(f"{key}: {shown(value)} is not a list of sources")
-    return tuple(_source(key, v) for v in value)
 
 
 def _source(key: str, value: Any) -> FillFrom:
@@ -127,12 +125,6 @@ def _source(key: str, value: Any) -> FillFrom:
     return FillFrom((source[0], source[1]), (to[0], to[1]), known_radius)
 
 
-def _views(key: str, value: Any) -> tuple[MoreView, ...]:
-    if not isinstance(value, list | tuple) or len(value) > MOST_VIEWS:
-        raise ScriptError(f"{key}: {shown(value)} is not a list of at most {MOST_VIEWS} photos")
-    return tuple(_view(key, v) for v in value)
-
-
 def _view(key: str, value: Any) -> MoreView:
     if isinstance(value, MoreView):
         return value
@@ -140,12 +132,6 @@ def _view(key: str, value: Any) -> MoreView:
         raise ScriptError(f'{key}: {shown(value)} is not {{"photo": "FILE", "at": [x, y]}}')
     at = None if value.get("at") is None else _numbers(2, 2)(key, value["at"])
     return MoreView(_text(key, value["photo"]), None if at is None else (at[0], at[1]))
-
-
-def _keys(key: str, value: Any) -> tuple[EditScript, ...]:
-    if not isinstance(value, list | tuple) or len(value) > MOST_KEYS:
-        raise ScriptError(f"{key}: {shown(value)} is not a list of at most {MOST_KEYS} poses")
-    return tuple(_key(key, pose) for pose in value)
 
 
 def _key(key: str, value: Any) -> EditScript:
@@ -202,9 +188,6 @@ def _between(least: float, most: float) -> Callable[[str, Any], float]:
     return parse
 
 
-Read = Callable[[str, Any], Any]
-
-
 @dataclass(frozen=True)
 class Values:
     """The values of an option: `read` checks one of a script, by the option's name.
@@ -220,9 +203,11 @@ class Values:
 
 
 FLAG, TEXT, NUMBER = Values("flag", _flag), Values("text", _text), Values("number", _number)
-POINTS, HANDLES = Values("points", _points, (2, 2)), Values("handles", _handles)
-SOURCES, KEYS = Values("sources", _sources), Values("keys", _keys)
-VIEWS = Values("views", _views)
+POINTS = Values("points", _several("points", _numbers(2, 2)), (2, 2))
+HANDLES = Values("handles", _several("handles", _handle))
+SOURCES = Values("sources", _several("sources", _source))
+VIEWS = Values("views", _several("photos", _view, MOST_VIEWS))
+KEYS = Values("keys", _several("poses", _key, MOST_KEYS))
 SHARE = Values("number", _between(0, 1))
 
 

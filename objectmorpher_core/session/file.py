@@ -309,8 +309,6 @@ def _check(document: Document) -> None:
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
             _near("matte", item.matte.box, _size_around(item, (width, height)))
-        for view in item.shape.views:
-            view.check()
         _check_paint(item)
         _check_lifted(item)
         if item.seen_from is not None and not 0 <= item.seen_from <= 90:

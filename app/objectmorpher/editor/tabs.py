@@ -13,7 +13,7 @@ from ..system.texts import t
 from .tab import Tab
 
 if TYPE_CHECKING:
-    from objectmorpher_core.lift.registration.further import OtherPhoto
+    from objectmorpher_core.lift.registration.other_photo import OtherPhoto
 
     from .autosave import Autosave
     from .intents.posing import Posing
@@ -50,7 +50,7 @@ class Tabs:
 
     def selected(self, path: Path) -> OtherPhoto | None:
         """A photo's file as a tab shows it, with the last object that is selected there."""
-        from objectmorpher_core.lift.registration.further import OtherPhoto
+        from objectmorpher_core.lift.registration.other_photo import OtherPhoto
 
         for tab in self.all:
             if (document := tab.document) is None or tab.source != path:

@@ -38,7 +38,7 @@ from .view import Action, SelectMode, ToolName
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
-    from objectmorpher_core.lift.registration.further import OtherPhoto
+    from objectmorpher_core.lift.registration.other_photo import OtherPhoto
 
     from .intents.posing import Posing
     from .state import EditorState
@@ -68,6 +68,17 @@ class Question:
     label: str  # of the step
     k: int
     combine: Combine = Combine.REFINED
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """An object that is to be lifted."""
+
+    k: int
+    mask: Mask  # known by its identity: with another one the answer is too late
+    cut: Cut
+    lifter: BackendChoice
+    shape: LiftSettings
 
 
 class Tasks:
@@ -181,73 +192,73 @@ class Tasks:
     def _drop_question(self) -> None:
         self.question = None
 
-    def lift(self, shape: LiftSettings | None = None, label: str = "") -> None:
+    def lift(self, shape: LiftSettings | None = None, label: str | None = None) -> None:
         """Asks for the current object in 3D; with another `shape`, which is a step of its own."""
-        editor, document = self._editor, self._editor.document
-        thing, k = editor.object, editor.current
-        if document is None or thing is None or thing.selection is None:
+        if (asked := self._asked(shape)) is None:
             return
-        editor.message = None
-        photo, settings, mask = document.photo, editor.settings, thing.mask
-        wanted = replace(shape or thing.shape, count=settings.gaussians, horizon=document.horizon)
-
-        def changed(current: Document, answer: tuple[Matte, LiftedObject]) -> Document | None:
-            if k >= len(current.objects) or current.objects[k].mask is not mask:
-                return None
-            if shape is None:
-                return edits.set_lifted(current, k, *answer, wanted)
-            return edits.reshape(current, k, *answer, wanted)
+        title = t("Lifting the object")
 
         def accept(answer: tuple[Matte, LiftedObject]) -> None:
-            self.make_ready(k, lambda current: changed(current, answer), title, show)
+            self._take_shape(asked, (asked.shape, *answer), title, label)
 
-        def show(document: Document) -> None:
-            if shape is None:
-                self._take_lift(document, k)
-            elif not editor.hand.is_busy:
-                self._posing.select(None)
-                editor.apply(label, editor.derived.solved(document, k, None))
-
-        title = t("Lifting the object")
-        editor.jobs.start(
-            title, job_functions.lift,
-            Cut(photo.pixels, photo.camera, thing.selection, thing.mixed),
-            BackendChoice(settings.backends.lift, document.seed), wanted,
-            done=accept, failed=editor.complain_of, kind=LIFT,
+        self._editor.jobs.start(
+            title, job_functions.lift, asked.cut, asked.lifter, asked.shape,
+            done=accept, failed=self._editor.complain_of, kind=LIFT,
         )  # fmt: skip
 
     def lift_with(self, other: Path | OtherPhoto, label: str) -> None:
         """Asks for the current object lifted with another photo of it, too; one step."""
-        editor, document = self._editor, self._editor.document
-        thing, k = editor.object, editor.current
-        if document is None or thing is None or thing.selection is None:
+        if (asked := self._asked()) is None:
             return
-        editor.message = None
-        photo, settings, mask = document.photo, editor.settings, thing.mask
-        shape = replace(thing.shape, count=settings.gaussians, horizon=document.horizon)
         title = t("Comparing with {name}", name=other.name)
 
         def accept(answer: tuple[LiftSettings, Matte, LiftedObject]) -> None:
-            def changed(now: Document) -> Document | None:
-                if k >= len(now.objects) or now.objects[k].mask is not mask:
-                    return None
-                wanted, matte, lifted = answer
-                return edits.reshape(now, k, matte, lifted, wanted)
+            self._take_shape(asked, answer, title, label)
 
-            self.make_ready(k, changed, title, show)
+        self._editor.jobs.start(
+            title, job_functions.lift_with_photo, asked.cut, other,
+            (self._editor.settings.backends.segment, asked.lifter), asked.shape,
+            done=accept, failed=self._editor.complain_of, kind=LIFT,
+        )  # fmt: skip
+
+    def _asked(self, shape: LiftSettings | None = None) -> _Asked | None:
+        """The current object, to be lifted; None where nothing is selected."""
+        editor, document = self._editor, self._editor.document
+        thing = editor.object
+        if document is None or thing is None or thing.selection is None or thing.mask is None:
+            return None
+        editor.message = None
+        photo, settings = document.photo, editor.settings
+        wanted = replace(shape or thing.shape, count=settings.gaussians, horizon=document.horizon)
+        cut = Cut(photo.pixels, photo.camera, thing.selection, thing.mixed)
+        choice = BackendChoice(settings.backends.lift, document.seed)
+        return _Asked(editor.current, thing.mask, cut, choice, wanted)
+
+    def _take_shape(
+        self,
+        asked: _Asked,
+        made: tuple[LiftSettings, Matte, LiftedObject],
+        title: str,
+        label: str | None,
+    ) -> None:
+        """What was asked for; with a `label` it is another shape of what was lifted, as a step."""
+        editor, k = self._editor, asked.k
+        settings, matte, lifted = made
+
+        def changed(now: Document) -> Document | None:
+            if k >= len(now.objects) or now.objects[k].mask is not asked.mask:
+                return None
+            change = edits.set_lifted if label is None else edits.reshape
+            return change(now, k, matte, lifted, settings)
 
         def show(now: Document) -> None:
-            if not editor.hand.is_busy:
+            if label is None:
+                self._take_lift(now, k)
+            elif not editor.hand.is_busy:
                 self._posing.select(None)
                 editor.apply(label, editor.derived.solved(now, k, None))
 
-        choice = BackendChoice(settings.backends.lift, document.seed)
-        editor.jobs.start(
-            title, job_functions.lift_with_photo,
-            Cut(photo.pixels, photo.camera, thing.selection, thing.mixed), other,
-            (settings.backends.segment, choice), shape,
-            done=accept, failed=editor.complain_of, kind=LIFT,
-        )  # fmt: skip
+        self.make_ready(k, changed, title, show)
 
     def make_ready(
         self,

@@ -13,7 +13,7 @@ from objectmorpher_core.base.arrays import Pixels
 from objectmorpher_core.compose.plate.repair import PlatePatch
 from objectmorpher_core.document.model import LiftedObject, Matte, Plate
 from objectmorpher_core.document.settings import Refined
-from objectmorpher_core.document.views import Sides
+from objectmorpher_core.document.sides import Sides
 from objectmorpher_core.segment import Found
 
 from ..worker.job_functions import Variant

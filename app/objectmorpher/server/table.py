@@ -18,7 +18,7 @@ from objectmorpher_core.document import model as documents
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import LiftedObject, LiftSettings, Matte, Plate, Prompt
 from objectmorpher_core.document.settings import Hint, Refined, Shadow
-from objectmorpher_core.document.views import FurtherView, Sides
+from objectmorpher_core.document.sides import FurtherView, Sides
 from objectmorpher_core.scripting.runner import RefineOptions
 
 from ..editor.settings import AUTO
@@ -154,11 +154,6 @@ def _check_lift(cut: Cut, choice: BackendChoice, shape: LiftSettings) -> None:
     _require(0 < shape.count <= MOST_GAUSSIANS, f"{shape.count} Gaussians are asked for")
     if shape.hidden is not None:
         _check_mask(shape.hidden, cut.pixels, "mask of what is hidden")
-    for view in shape.views:
-        try:
-            view.check()
-        except ValueError as error:
-            raise MessageError(str(error)) from error
     if shape.nearness is not None:
         _require(shape.nearness.ndim == 2 and shape.nearness.size > 0, "nearness is no map")
 

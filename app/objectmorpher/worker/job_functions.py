@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from objectmorpher_core.document.gaussians import Gaussians
     from objectmorpher_core.document.settings import Refined, Shadow
     from objectmorpher_core.lift.refitting import Background, Lifted, Refitted
-    from objectmorpher_core.lift.registration.further import OtherPhoto
     from objectmorpher_core.lift.registration.imported import Import, ImportTarget
+    from objectmorpher_core.lift.registration.other_photo import OtherPhoto
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
@@ -172,7 +172,7 @@ def lift_with_photo(
     Of a file it is the main subject. `chosen`: the segmenter, and the lifter.
     """
     from objectmorpher_core.lift import LiftSubject, load
-    from objectmorpher_core.lift.registration.further import with_photo
+    from objectmorpher_core.lift.registration.other_photo import with_photo
     from objectmorpher_core.pictures.image import ImageError
     from objectmorpher_core.pipeline import other_photo
     from objectmorpher_core.segment.mask_edit import is_selected

@@ -23,7 +23,7 @@ from ...base.camera import Camera
 from ...base.pixels import unit_pixels
 from ...base.poisson_disk import nearest_in
 from ...document.model import LiftedObject, Matte
-from ...document.views import FurtherView, Sides
+from ...document.sides import FurtherView, Sides
 from ...raster.posed import RestSplats, projection_jacobians
 from ...raster.rules import RULES
 from ..registration.shown import rest_picture, visibilities
@@ -45,6 +45,7 @@ AROUND = 6  # of those
 DETAIL = 0.06  # x extent, over which a detail says how deep the surface is
 LIKELY = 0.35  # details' weight of the lifter's own depth
 THINNEST = 0.15  # x its thickness, that stays of it
+THICK = 0.3  # weight of what may stay as thick as it is beside what may not
 LEAST = 12  # Gaussians that two photos show, of which the light is found
 WELL = 0.4  # cosine with the line of sight, from which a Gaussian's colours are compared
 FACING = 0.25  # cosine, from which a further photo's picture of it is carried
@@ -91,29 +92,26 @@ class _Rays:
         extra = 0.0 if body.detail is None else body.detail
         cells = body.silhouette.cells.reshape(-1, 2)
         halves = [side.half(cells).reshape(self.inside.shape) for side in (body.front, body.back)]
-        front, back = body.middle + halves[0] + extra, body.middle - halves[1]
+        before = halves[0] + extra  # the middle sheet, that the front is
+        front = body.middle + before
         moved = self._by_details(body, front)
         may = self._may_be(front + moved)
         grid = self.extent * np.linspace(-REACH, REACH, STEPS)
         within = self._by_silhouette(may, grid)
-        thickness = np.maximum(front - back, 1e-3)
-        lowest = grid[_ends(may, within, grid)] + front + moved
-        excess = np.maximum(lowest - (back + moved + within), 0) * self.inside
+        thickness = np.maximum(before + halves[1], 1e-3)
+        room = within - grid[_ends(may, within, grid)]  # behind the front
         share = self._spread(
-            np.clip(1 - excess / thickness, THINNEST, 1), np.where(excess > 0, 1.0, 0.3), SPREAD
+            np.clip(room / thickness, THINNEST, 1), np.where(room < thickness, 1.0, THICK), SPREAD
         )
         share = np.where(self.inside, share, 1.0)
-        front = front + moved + within
-        middle = 0.5 * (2 * front - share * thickness)
-        middle += share * (body.middle - 0.5 * (2 * (body.middle + halves[0] + extra) - thickness))
-        change = np.where(self.inside, middle - body.middle, 0.0)
+        change = np.where(self.inside, moved + within + (1 - share) * before, 0.0)
         # Beyond the outline as at it: there the sheet is continued by its slope.
         middle = body.middle + change.ravel()[nearest_in(self.inside)]
         whole = self.inside.astype(np.float64)
         return replace(
             body, middle=middle,
-            front=body.front.towards(np.maximum(front - extra - middle, 0), whole),
-            back=body.back.towards(np.maximum(middle - front + share * thickness, 0), whole),
+            front=body.front.towards(np.maximum(share * before - extra, 0), whole),
+            back=body.back.towards(share * halves[1], whole),
         )  # fmt: skip
 
     def _at(self, ways: F64, height: F64) -> F64:

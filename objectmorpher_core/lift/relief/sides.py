@@ -28,7 +28,7 @@ from ...compose.plate.patch_detail import with_detail
 from ...compose.plate.sources import Guide, PatchTone
 from ...compose.plate.structure_lines import find_lines
 from ...document.model import LiftedObject, Matte, Placement
-from ...document.views import Sides
+from ...document.sides import Sides
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats, projection_jacobians
 from ...raster.reference_layers import Picture3D

@@ -12,9 +12,8 @@ import pytest
 from objectmorpher_core import models
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.progress import silent
-from objectmorpher_core.document.alike import show_the_same
 from objectmorpher_core.document.edits import EditError, set_depth
-from objectmorpher_core.document.model import LiftedObject, LiftSettings
+from objectmorpher_core.document.model import LiftedObject, LiftSettings, show_the_same
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, ReliefBody
 from objectmorpher_core.lift.relief.depth_look import box_around, look_at_all

@@ -12,9 +12,9 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.document.edits import add_object, set_lifted, set_mask
 from objectmorpher_core.document.model import Document, LiftedObject, LiftSettings, Photo, Prompt
-from objectmorpher_core.document.views import FurtherView
+from objectmorpher_core.document.sides import FurtherView
 from objectmorpher_core.lift import LiftError, LiftSubject
-from objectmorpher_core.lift.registration.further import OtherPhoto, with_photo
+from objectmorpher_core.lift.registration.other_photo import OtherPhoto, with_photo
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.raster import tiles

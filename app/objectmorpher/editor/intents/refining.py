@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.alike import show_the_same
-from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.model import Document, show_the_same
 from objectmorpher_core.document.settings import Refined
 
 from ...system.texts import t

@@ -33,8 +33,8 @@ from ...worker import job_functions
 from ..view import Painted
 
 if TYPE_CHECKING:
-    from objectmorpher_core.lift.registration.further import OtherPhoto
     from objectmorpher_core.lift.registration.imported import Import, ImportTarget
+    from objectmorpher_core.lift.registration.other_photo import OtherPhoto
     from objectmorpher_core.lift.registration.placement import Proposal
 
     from ..state import EditorState

@@ -34,6 +34,7 @@ def write_pictures(trainer: Trainer, steps: int) -> None:
     folder = trainer.places.out / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     is_first = trainer.accelerator.is_main_process
+    decoder = _decoder(trainer.model, weights, trainer.device, number) if is_first else None
     trainer.transformer.eval()
     for k, triplet in enumerate(trainer.held_out):
         at = trainer.cache.read(triplet, trainer.device)
@@ -41,7 +42,6 @@ def write_pictures(trainer: Trainer, steps: int) -> None:
             tokens = sampled(trainer, at, steps, k)
             if not is_first:
                 continue
-            decoder = _decoder(trainer.model, weights, trainer.device, number)
             made = trainer.model.decode(decoder, tokens, at.grids[0])
         b, coarse, a = triplet.read()
         row = np.hstack([_as_large(p, made) for p in (b, coarse, made, a)])

@@ -9,6 +9,7 @@ import numpy as np
 from ..base.arrays import F32, F64, U8, Mask, frozen
 from ..base.camera import Camera
 
+MOST_MATCHES = 20_000  # between two photos
 INSIDE = 128  # of 255: from this alpha on a pixel shows the object
 
 
@@ -84,26 +85,28 @@ class FurtherView:
         object.__setattr__(self, "pixels", frozen(self.pixels, np.uint8))
         object.__setattr__(self, "alpha", frozen(self.alpha, np.uint8))
         object.__setattr__(self, "matches", frozen(self.matches, np.float32))
-
-    def check(self) -> None:
-        """Raises ValueError where its parts do not fit each other."""
-        if self.pose.shape != (4, 4) or np.linalg.det(self.pose[:3, :3]) <= 0:
-            raise ValueError("the pose of a further photo is none")
-        if self.pixels.shape != (*self.alpha.shape, 3) or not self.alpha.size:
-            raise ValueError(
-                f"a further photo is {self.pixels.shape}, its alpha {self.alpha.shape}"
-            )
-        if self.matches.ndim != 2 or self.matches.shape[1] != 4:
-            raise ValueError(f"matches with a further photo are {self.matches.shape}, not (n, 4)")
-        own = self.camera
-        if not own.focal > 0 or min(own.width, own.height) < 1:
-            raise ValueError("the camera of a further photo makes no sense")
+        self._check()
 
     @property
     def mask(self) -> Mask:
         """(h, w) of the cut-out, which pixels show the object."""
         return np.asarray(self.alpha >= INSIDE)
 
-    def world_points(self, points: np.ndarray) -> F64:
-        """Points (..., 3) of the first photo's world in this camera's."""
-        return points @ self.pose[:3, :3].T + self.pose[:3, 3]
+    def _check(self) -> None:
+        """Raises ValueError where its parts do not fit each other."""
+        is_finite = np.isfinite(self.pose).all() and np.isfinite(self.matches).all()
+        if self.pose.shape != (4, 4) or not is_finite or np.linalg.det(self.pose[:3, :3]) <= 0:
+            raise ValueError("the pose of a further photo is none")
+        is_picture = self.alpha.ndim == 2 and self.alpha.size > 0
+        if not is_picture or self.pixels.shape != (*self.alpha.shape, 3):
+            raise ValueError(
+                f"a further photo is {self.pixels.shape}, its alpha {self.alpha.shape}"
+            )
+        if self.matches.shape[1:] != (4,) or len(self.matches) > MOST_MATCHES:
+            shape = self.matches.shape
+            raise ValueError(
+                f"matches are {shape}, not four numbers each of {MOST_MATCHES} at most"
+            )
+        own = self.camera
+        if not own.focal > 0 or min(own.width, own.height) < 1:
+            raise ValueError("the camera of a further photo makes no sense")

@@ -21,7 +21,7 @@ from ...base.camera import Camera
 from ...base.progress import Progress, part, silent
 from ...document.bounds import MOST_VIEWS
 from ...document.model import LiftedObject, LiftSettings, Matte
-from ...document.views import FurtherView
+from ...document.sides import FurtherView
 from ...pictures.image import to_u8
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats
