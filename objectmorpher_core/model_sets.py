@@ -7,13 +7,12 @@ the weights to the GPU where they do not stay there.
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from . import models
-from .base.progress import Progress, part, silent
+from .base.progress import Progress, silent
 from .compose.plate import inpaint_latent
 from .compose.refine import klein, qwen
 from .compose.refine.diffusion import DiffusionRefiner
@@ -21,7 +20,6 @@ from .lift.trellis.lifter import TrellisLifter
 from .lift.triposplat.lifter import TripoSplatLifter
 from .models import HubModel, ModelError, ModelSet, depth_net, device
 from .models.device import Device
-from .models.fetch import SLACK
 from .models.ledger import Ledger, Model
 from .models.plans import Need, Needs, Network, PipelineNeed, Plan
 from .segment.sam import sam_torch
@@ -146,25 +144,7 @@ def get_set(chosen: SetOffer, progress: Progress = silent, accepted: str = "") -
     `Cancelled` passes through; the next call goes on from there.
     """
     missing = [step.model for step in chosen.steps if models.place(step.model.id) is None]
-    where = models.folder()
-    while not where.exists():
-        where = where.parent
-    # What comes as pickles is written twice.
-    needed = sum(m.size * (2 if models.has_pickles(m) else 1) for m in missing) + SLACK
-    free = shutil.disk_usage(where).free
-    if missing and needed > free:
-        raise ModelError(
-            f"{chosen.set.id} needs {needed / 1e9:.1f} GB in {models.folder()},"
-            f" {free / 1e9:.1f} GB are free"
-        )
-    for model in missing:
-        models.check_licence(model, accepted)
-    whole, done = max(sum(m.size for m in missing), 1), 0
-    for model in missing:
-        rest = part(progress, done / whole, (done + model.size) / whole)
-        models.get(model.id, rest, accepted)
-        done += model.size
-    progress(1.0, f"{chosen.set.id} is ready")
+    models.get_all(missing, chosen.set.id, progress, accepted)
 
 
 def need_of(model: HubModel) -> Needs | None:

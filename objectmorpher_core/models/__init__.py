@@ -26,9 +26,11 @@ from .hub import (
     convert_folder,
     files,
     get,
+    get_all,
     has_pickles,
     installed,
     look_hub,
+    missing,
     not_installed,
     place,
     remove_hub,
@@ -50,6 +52,7 @@ from .registry import (
     trunks,
     weight,
     weights,
+    with_needs,
 )
 
 __all__ = [
@@ -75,6 +78,7 @@ __all__ = [
     "files",
     "folder",
     "get",
+    "get_all",
     "has_pickles",
     "hub_model",
     "hub_models",
@@ -83,6 +87,7 @@ __all__ = [
     "look",
     "look_hub",
     "look_trunk",
+    "missing",
     "model_sets",
     "not_installed",
     "path",
@@ -99,4 +104,5 @@ __all__ = [
     "verify_hub",
     "weight",
     "weights",
+    "with_needs",
 ]

@@ -18,11 +18,11 @@ from typing import Any, Literal
 
 from ..base import installation, torch_environment
 from ..base.files import make_folder, sync_folder, write_all
-from ..base.progress import Progress, silent
+from ..base.progress import Progress, part, silent
 from ..base.quoting import shown
 from . import hub_download
 from .fetch import SLACK, check_online, folder, run_watched, sha256_of
-from .registry import HubModel, ModelError, families, hub_model, hub_models
+from .registry import HubModel, ModelError, families, hub_model, hub_models, with_needs
 from .tensors_only import convert
 from .weight_folder import (
     LATENT,
@@ -121,6 +121,39 @@ def get(id: str, progress: Progress = silent, accepted: str = "") -> Path:
         raise ModelError(f"{id} cannot be written to {folder()}: {reason}") from error
     progress(1.0, f"{id} is ready")
     return folder() / id
+
+
+def missing(id: str) -> tuple[HubModel, ...]:
+    """What is still to be got for model `id` to work, itself last. Raises ModelError."""
+    found = with_needs(id, lambda other: place(other) is not None)
+    return tuple(model for model in found if place(model.id) is None)
+
+
+def get_all(
+    wanted: Sequence[HubModel], name: str, progress: Progress = silent, accepted: str = ""
+) -> None:
+    """Download models one after the other; `name` stands for all of them in messages.
+
+    Raises ModelError: one sentence, before anything starts where the disk is too small or a
+    licence is not accepted. `Cancelled` passes through; the next call goes on from there.
+    """
+    where = folder()
+    while not where.exists():
+        where = where.parent
+    # What comes as pickles is written twice.
+    needed = sum(model.size * (2 if has_pickles(model) else 1) for model in wanted) + SLACK
+    free = shutil.disk_usage(where).free
+    if wanted and needed > free:
+        raise ModelError(
+            f"{name} needs {needed / 1e9:.1f} GB in {folder()}, {free / 1e9:.1f} GB are free"
+        )
+    for model in wanted:
+        check_licence(model, accepted)
+    whole, done = max(sum(model.size for model in wanted), 1), 0
+    for model in wanted:
+        get(model.id, part(progress, done / whole, (done + model.size) / whole), accepted)
+        done += model.size
+    progress(1.0, f"{name} is ready")
 
 
 def is_plain(model: HubModel) -> bool:

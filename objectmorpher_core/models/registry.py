@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -86,6 +86,7 @@ class HubModel:
     files: tuple[str, ...] = ()  # paths in the repository; * stands for anything
     sha256: Mapping[str, str] = field(default_factory=dict)  # of the files where it is known
     page: str = ""  # for people; empty: the repository's
+    needs: tuple[str, ...] = ()  # what it does not work without: an id, or several that do, "a | b"
 
     @property
     def home(self) -> str:
@@ -137,7 +138,7 @@ def trunks() -> tuple[Trunk, ...]:
 def hub_models() -> tuple[HubModel, ...]:
     """Return all models of several files in the registry's order: the best of a family first."""
     return tuple(
-        HubModel(**{**entry, "files": tuple(entry.get("files", ()))})
+        HubModel(**{**entry, **{k: tuple(entry.get(k, ())) for k in ("files", "needs")}})
         for entry in _registry()["model"]
     )
 
@@ -158,6 +159,20 @@ def families() -> tuple[str, ...]:
 def hub_model(id: str) -> HubModel:
     """The model called `id`; raises ModelError with the known names."""
     return _called(id, hub_models(), f"model called {id!r}", hub_models())
+
+
+def with_needs(id: str, is_there: Callable[[str], bool]) -> tuple[HubModel, ...]:
+    """Model `id` after all that it needs and that is not there; of several that do, the last.
+
+    Raises ModelError where `id` is unknown.
+    """
+    model = hub_model(id)
+    wanted: dict[str, HubModel] = {}
+    for need in model.needs:
+        choices = need.split(" | ")
+        if not any(map(is_there, choices)):
+            wanted |= {each.id: each for each in with_needs(choices[-1], is_there)}
+    return (*wanted.values(), model)
 
 
 def trunk(id: str) -> Trunk:

@@ -75,8 +75,10 @@ Read = Callable[[str, Any], Any]
 
 def _number(key: str, value: Any) -> float:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not -MOST_NUMBER <= value <= MOST_NUMBER:  # NaN compares false
+    if not is_number or value != value:
         raise ScriptError(f"{key}: {shown(value)} is not a number")
+    if not -MOST_NUMBER <= value <= MOST_NUMBER:
+        raise ScriptError(f"{key}: {shown(value)} is farther from 0 than {MOST_NUMBER:g}")
     return float(value)
 
 

@@ -216,6 +216,7 @@ def build_document(
         )
     photo = _photo(tree.get("photo"), members, reader)
     reader.most = max(reader.most, _most_carried(objects))
+    reader.most_colours = max(reader.most, MOST_INVENTED)
     try:
         document = _with_copies(reader.value(Document, tree | {"photo": photo}, "document"))
         _check(document)
@@ -263,7 +264,6 @@ def _photo(tree: object, members: Mapping[str, bytes], reader: TreeReader) -> Ph
         picture = read_picture(source, reader.most)
     except ImageError as error:
         raise SessionError(f"the session's photo cannot be read: {error}") from error
-    reader.most = max(reader.most, MOST_INVENTED)
     return Photo(picture, camera, source, reader.value(str, tree.get("name"), "photo.name"))
 
 

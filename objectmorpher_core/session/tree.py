@@ -26,6 +26,8 @@ from ..pictures.image import (
     read_picture,
 )
 
+A_MASK = np.zeros((0, 0), bool)
+
 
 class SessionError(ValueError):
     """The file is not a session that can be opened; one sentence."""
@@ -86,7 +88,8 @@ class TreeReader:
 
     members: Mapping[str, bytes]  # the PNG files by member name
     arrays: Mapping[str, np.ndarray]  # by path
-    most: int = MAX_PIXELS  # px of a picture
+    most: int = MAX_PIXELS  # px of a mask
+    most_colours: int = MAX_PIXELS  # px of a picture
     _pictures: dict[str, np.ndarray] = field(default_factory=dict)  # decoded, by member name
 
     def value(self, hint: Any, tree: Any, where: str) -> Any:
@@ -112,9 +115,10 @@ class TreeReader:
         """`X | None`, or several kinds of array."""
         if tree is None and types.NoneType in hints:
             return None
-        if all(get_origin(h) is np.ndarray for h in hints if h is not types.NoneType):
-            return self._array(hints, tree, where)
-        return self.value(next(h for h in hints if h is not types.NoneType), tree, where)
+        some = tuple(hint for hint in hints if hint is not types.NoneType)
+        if all(get_origin(hint) is np.ndarray for hint in some):
+            return self._array(some, tree, where)
+        return self.value(some[0], tree, where)
 
     def _tuple(self, hints: tuple, tree: Any, where: str) -> tuple:
         if not isinstance(tree, list):
@@ -144,18 +148,19 @@ class TreeReader:
             case {"array": str(path)} if path in self.arrays:
                 array = self.arrays[path]
             case {"png": str(member)} if member in self.members:
-                array = self._picture(member)
+                is_mask = all(_is_of(A_MASK, hint) for hint in hints)
+                array = self._picture(member, self.most if is_mask else self.most_colours)
             case _:
                 raise _damaged(where)
         if not any(_is_of(array, hint) for hint in hints):
             raise SessionError(f"the session is damaged: {where} has numbers of another kind")
         return frozen(array)
 
-    def _picture(self, member: str) -> np.ndarray:
+    def _picture(self, member: str, most: int) -> np.ndarray:
         """A member's pixels, or mask: the same array wherever it is named again."""
         if member not in self._pictures:
             try:
-                picture = read_picture(self.members[member], self.most)
+                picture = read_picture(self.members[member], most)
             except ImageError as error:
                 raise SessionError(f"the session is damaged: {named(member)}: {error}") from error
             pixels = picture.pixels

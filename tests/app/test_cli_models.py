@@ -66,6 +66,12 @@ def test_nothing_is_downloaded_without_consent(capsys, monkeypatch, server: Hub)
     assert code == 0 and FREE.id in out
 
 
+def test_what_a_model_needs_is_named_before_it_is_got(capsys) -> None:
+    code, _, err = said(capsys, "get", "trellis-image-large")
+    assert code == 1 and "trellis-image-large with dinov2-with-registers-large: " in err
+    assert "licence Apache-2.0 and MIT" in err and "--yes" in err
+
+
 def test_a_model_is_got_verified_told_of_and_removed(capsys, server: Hub, cache: Path) -> None:
     assert said(capsys, "get", FREE.id, "--yes")[:2] == (0, f"{FREE.id}: {cache / FREE.id}\n")
     assert said(capsys, "path", FREE.id)[1] == f"{cache / FREE.id}\n"

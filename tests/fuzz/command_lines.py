@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from functools import cache
 
 from hypothesis import strategies as st
@@ -22,7 +23,7 @@ PHOTOS = [
 ]  # fmt: skip
 FILES = ("p/plain-mask.png", "p/plain.png", "p/strip-mask.png", "p/text.png", "p/none.png", "p",
          "p/cloud.off", "/dev/null", "/dev/zero", "p/deep.png")  # fmt: skip
-COMMANDS = [*["edit"] * 16, "select", "replay", "info", "convert", "batch", "bench", "models",
+COMMANDS = [*["edit"] * 24, "select", "replay", "info", "convert", "batch", "bench", "models",
             "doctor", "edti", ""]  # fmt: skip
 MASKS = ("", "", "", "-most", "-line", "-none")
 ODD = (
@@ -30,14 +31,19 @@ ODD = (
     "1e400", "inf", "-inf", "nan", "1_0", "0x10", "٣", "", " ", "abc", "1" * 5000, "1.5", "65536",
     "2147483648", "18446744073709551616", "½",
 )  # fmt: skip
+WORDS = ("auto", "none", "telea", "patchmatch", "relief", "grabcut", "dino", "subject", "lama",
+         "qwen", "harmonise", "arap", "laplacian", "geodesic", "euclidean", "mirrored",
+         "continued", "yes", "no", "morph", "sway", "turn", "wat", "")  # fmt: skip
 QUICK = (["--gaussians", "200", "--inpaint", "telea"],) * 5 + ([],)
 
 
 def numbers() -> SearchStrategy[str]:
     """Ordinary and odd ones."""
     usual = st.integers(-5, 70).map(str)
+    small = st.integers(0, 300).map(lambda n: str(n / 100))  # what most settings range over
     any_float = st.floats(allow_nan=False, allow_infinity=False).map(repr)
-    return st.one_of(usual, usual, st.sampled_from(ODD), any_float, st.integers().map(str))
+    whole = st.integers().map(str)
+    return st.one_of(usual, usual, small, small, st.sampled_from(ODD), any_float, whole)
 
 
 def joined(least: int, most: int) -> SearchStrategy[str]:
@@ -56,10 +62,7 @@ def values() -> dict[str, SearchStrategy[str]]:
     """What an option takes, by its metavar; others take numbers."""
     files = st.sampled_from(FILES)
     outs = st.sampled_from(OUTPUTS)
-    words = ["auto", "none", "telea", "patchmatch", "relief", "grabcut", "dino", "subject", "lama",
-             "qwen", "harmonise", "arap", "laplacian", "geodesic", "euclidean", "mirrored",
-             "continued", "yes", "no", "morph", "sway", "turn", "wat", ""]  # fmt: skip
-    names = st.sampled_from(words)
+    names = st.sampled_from(WORDS)
     known: dict[str, SearchStrategy[str]] = {
         "X,Y": joined(2, 2), "X0,Y0,X1,Y1": joined(4, 4), "DX,DY[,DZ]": joined(2, 3),
         "YAW[,PITCH,ROLL]": joined(1, 3), "POSE": names, "X,Y:X2,Y2[,DZ]": pairs(True),
@@ -85,15 +88,24 @@ def options_of(command: str) -> tuple[argparse.Action, ...]:
     )
 
 
+def promised(action: argparse.Action) -> list[SearchStrategy[str]]:
+    """The words that an option's help names, where it takes a word."""
+    is_word = action.metavar in ("NAME", "KIND", "MODE") or "|" in str(action.metavar)
+    named = [
+        word for word in WORDS if word in re.findall(r"\w+", f"{action.metavar} {action.help}")
+    ]
+    return [st.sampled_from(named)] * 3 if is_word and named else []
+
+
 @st.composite
 def option(draw: st.DrawFn, command: str) -> list[str]:
     """One option with a value, now and then misspelt or without one."""
     action = draw(st.sampled_from(options_of(command)))
-    name = draw(st.sampled_from([action.option_strings[-1]] * 30 + ["--nonsense", "-", "--"]))
+    name = draw(st.sampled_from([action.option_strings[-1]] * 90 + ["--nonsense", "-", "--"]))
     if action.nargs == 0:
         return [name]
-    value = draw(values().get(str(action.metavar), numbers()))
-    return draw(st.sampled_from([[f"{name}={value}"]] * 8 + [[name, value], [name]]))
+    value = draw(st.one_of(values().get(str(action.metavar), numbers()), *promised(action)))
+    return draw(st.sampled_from([[f"{name}={value}"]] * 24 + [[name, value], [name]]))
 
 
 @st.composite

@@ -25,7 +25,7 @@ def test_no_attack_takes_much_more_than_the_session_as_it_was() -> None:
     assert told["a member that nothing names"] == "read"
     assert "unpack from" in told["arrays.npz is zeros"]
     assert "holds too many members" in told["400,000 members"]
-    assert "more than 2 megapixels" in told["objects/0/mask.png of 240 MP"]
+    assert "more than 9,600 px" in told["objects/0/mask.png of 240 MP"]
 
 
 def test_info_of_a_session_with_a_member_too_many(tmp_path: Path, capsys) -> None:

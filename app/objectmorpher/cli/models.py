@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from objectmorpher_core import lift, model_sets, models
@@ -83,13 +84,14 @@ def _get(options: argparse.Namespace) -> None:
             f" then objectmorpher models add {id} FILE"
         )
     if id in {model.id for model in models.hub_models()}:
-        model = models.hub_model(id)
-        if models.place(id) is None and model.repository:
-            models.check_licence(model, options.accept_licence or "")
-            _ask(model, options.is_agreed)
+        wanted = models.missing(id)
+        if wanted and all(model.repository for model in wanted):
+            for model in wanted:
+                models.check_licence(model, options.accept_licence or "")
+            _ask(wanted, options.is_agreed)
         with progress_bar(f"Getting {id}") as progress:
-            at = models.get(id, progress, options.accept_licence or "")
-        _write(f"{id}: {at}")
+            models.get_all(wanted, id, progress, options.accept_licence or "")
+        _write(f"{id}: {models.place(id)}")
         return
     if id in worker_file.worker_names():
         worker_file.accept_licence(id, options.accept_licence or "")
@@ -144,10 +146,20 @@ def _set_up(options: argparse.Namespace) -> None:
     _write(f"PyTorch {made.torch}: {plan.folder}, {_size(made.size)}")
 
 
-def _ask(model: HubModel, is_agreed: bool) -> None:
-    """The user's consent to a download. Raises UsageError without it."""
-    told = f"{model.id}: {_size(model.size)} from {model.home}, licence {model.licence}"
-    if models.has_pickles(model):
+def _ask(wanted: Sequence[HubModel], is_agreed: bool) -> None:
+    """The user's consent to downloads, the last of which the others are needed for.
+
+    Raises UsageError without it.
+    """
+    *needed, model = wanted
+    homes, licences = (
+        " and ".join(dict.fromkeys(values))
+        for values in ((m.home for m in wanted), (m.licence for m in wanted))
+    )
+    names = " with ".join([model.id, *(each.id for each in needed)])
+    size = _size(sum(each.size for each in wanted))
+    told = f"{names}: {size} from {homes}, licence {licences}"
+    if any(map(models.has_pickles, wanted)):
         told += "; it comes as pickles, of which nothing but the numbers is read"
     _consent(told, model.id, is_agreed)
 

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from objectmorpher_core import model_sets, models
 from objectmorpher_core.base.progress import Cancelled
@@ -69,6 +71,30 @@ def served(monkeypatch):
 
 
 BOTH = models.ModelSet("both", ("sam2.1-tiny", "sam2.1-small"), "a test")
+
+
+@given(there=st.sets(st.sampled_from([model.id for model in models.hub_models()])))
+def test_what_a_model_needs_comes_before_it(there: set[str]) -> None:
+    for model in models.hub_models():
+        wanted = [each.id for each in models.with_needs(model.id, there.__contains__)]
+        assert wanted[-1] == model.id and len(set(wanted)) == len(wanted)
+        assert not there & set(wanted[:-1])
+        for k, id in enumerate(wanted):
+            for need in models.hub_model(id).needs:
+                assert set(need.split(" | ")) & (there | set(wanted[:k]))
+
+
+def test_a_model_is_got_with_what_it_needs(served, monkeypatch) -> None:
+    pytest.importorskip("huggingface_hub")
+    known = tuple(
+        replace(m, needs=("sam2.1-large | sam2.1-small",)) if m.id == "sam2.1-tiny" else m
+        for m in registry.hub_models()
+    )
+    monkeypatch.setattr(registry, "hub_models", lambda: known)
+    wanted = models.missing("sam2.1-tiny")
+    assert [model.id for model in wanted] == ["sam2.1-small", "sam2.1-tiny"]
+    models.get_all(wanted, "sam2.1-tiny")
+    assert models.missing("sam2.1-tiny") == () and models.place("sam2.1-small") is not None
 
 
 def test_all_of_a_set_is_got_and_what_is_there_is_not_got_again(served):

@@ -298,7 +298,17 @@ class HubModels:
         """Gets one; the user has clicked the button, and accepted what licence needs that."""
         model = models.hub_model(id)
         accepted = model.licence if self.accepts(model) else ""
-        self._models.run(id, id, lambda progress: models.get(id, progress, accepted))
+
+        def fetch(progress: Progress) -> Path:
+            models.get_all(models.missing(id), id, progress, accepted)
+            return models.folder() / id
+
+        self._models.run(id, id, fetch)
+
+    def missing(self, model: HubModel) -> tuple[HubModel, ...]:
+        """A model after all that it needs and that is not there."""
+        there = {state.model.id for state in self.states if state.state == "ok"}
+        return models.with_needs(model.id, there.__contains__)
 
     def use_folder(self, given: Path) -> None:
         """The folder that a chosen file is in is the model from now on."""

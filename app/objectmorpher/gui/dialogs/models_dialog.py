@@ -253,12 +253,12 @@ GAINS = {
     "sam": "The first of its kind, which the paper uses",
     "sam-onnx": "Smaller and quicker, without PyTorch",
     "pixelhacker": "Invents what is behind objects, for a GPU: the paper's",
-    "moebius": "The same with a quarter of the numbers; also needs PixelHacker's autoencoder",
+    "moebius": "The same with a quarter of the numbers",
     "pixelhacker-vae": "What Moebius draws with; PixelHacker brings it, too",
     "lama": "Invents what is behind large objects, without a GPU",
     "migan": "Invents what is behind objects, the quickest",
     "trellis": "The whole object from one picture, for a GPU: the paper's",
-    "cupid": "The same with the photo's camera; also needs TRELLIS",
+    "cupid": "The same with the photo's camera",
     "triposplat": "The whole object in as many splats as you want, for a GPU; by DINOv3",
     "dinov2-with-registers": "What TRELLIS and CUPID see a picture with",
     "depth-anything": "A lifted object is as deep as it looks, not as its outline says",
@@ -270,7 +270,7 @@ GAINS = {
     "flux2-klein": "Makes the edit look photographed, in four steps, for a GPU of 12 GB",
     "flux2-klein-base": "What a LoRA of yours for FLUX.2-klein is trained on",
     "klein-refine-lora": "What you have trained it to do",
-    "klein-remove-lora": "Objects go with their shadows and reflections; also needs FLUX.2-klein",
+    "klein-remove-lora": "Objects go with their shadows and reflections",
 }
 SIZES = {
     "sam2.1-tiny": "Tiny", "sam2.1-small": "Small", "sam2.1-base-plus": "Base",
@@ -331,11 +331,17 @@ WIDE = 360.0  # points, of the choice of a size
 def _draw_facts(editor: Editor, shown: HubState) -> None:
     """Size, licence and source; the licence's box where it needs one; what is in the way."""
     hub, model = editor.models.hub, shown.model
-    size = f"{model.size / 1e6:.0f} MB" if model.size < 1e9 else f"{model.size / 1e9:.1f} GB"
+    *needed, _ = wanted = hub.missing(model)
+    bytes = sum(each.size for each in wanted)
+    size = f"{bytes / 1e6:.0f} MB" if bytes < 1e9 else f"{bytes / 1e9:.1f} GB"
     if shown.is_own:
         note(t("In your folder {folder}", folder=shown.path.name))
     elif model.repository:
-        note(t("{size} to download · licence {licence}", size=size, licence=model.licence))
+        licences = ", ".join(dict.fromkeys(each.licence for each in wanted))
+        note(t("{size} to download · licence {licence}", size=size, licence=licences))
+        if needed:
+            names = ", ".join(NAMES[each.family] for each in needed)
+            note(t("With what it needs: {names}", names=names))
     if shown.state == "damaged":
         note(t("It is damaged: {reason}", reason=shown.reason))
     source = model.home.removeprefix("https://")
