@@ -20,7 +20,7 @@ for package in ("diffusers", "peft", "accelerate", "transformers"):
     pytest.importorskip(package)
 
 import made_up  # noqa: E402
-from train_in_process import COURSE, PLAN  # noqa: E402
+from train_in_process import COURSE, FOUR_BITS, PLAN, allow_four_bits  # noqa: E402
 
 from objectmorpher_core import models  # noqa: E402
 from objectmorpher_core.base.progress import silent  # noqa: E402
@@ -276,6 +276,27 @@ def test_two_processes_have_the_gradients_of_one_and_learn_as_it_does(
             assert float((value - theirs[name]).abs().max()) < 0.02 * PLAN.rate, name
 
 
+@pytest.mark.slow
+def test_two_processes_share_a_base_in_four_bits(folder, weights, tmp_path, monkeypatch):
+    pytest.importorskip("bitsandbytes")
+    from accelerate.state import AcceleratorState
+    from safetensors.torch import load_file
+
+    run_two("four-bits", folder, weights["qwen"], tmp_path / "two.safetensors")
+    together = load_file(lora_file(folder / "four-bits"))
+    allow_four_bits(monkeypatch.setattr)
+    AcceleratorState._reset_state()  # its numbers are those of the first trainer of a process
+    try:
+        trainer = Trainer(made_up.places(folder, weights["qwen"], "four-bits-alone"), FOUR_BITS)
+        alone = load_file(trainer.train(Course(4, saved=4, looked=0)))
+    finally:
+        AcceleratorState._reset_state()
+    assert alone.keys() == together.keys()
+    for name, value in alone.items():
+        assert float((value - together[name]).abs().max()) < 0.02 * PLAN.rate, name
+    assert sum(float(v.abs().sum()) for n, v in alone.items() if "lora_B" in n) > 0
+
+
 def run_two(how: str, folder: Path, weights: Path, file: Path) -> None:
     """Of two processes over gloo, as `accelerate launch` starts them."""
     with socket.socket() as probe:
@@ -299,9 +320,7 @@ def test_a_base_in_four_bits_learns_and_takes_what_was_estimated(
 ):
     """On the CPU, which bitsandbytes can and diffusers refuses."""
     pytest.importorskip("bitsandbytes")
-    from diffusers.quantizers.bitsandbytes import BnB4BitDiffusersQuantizer
-
-    monkeypatch.setattr(BnB4BitDiffusersQuantizer, "validate_environment", lambda *_, **__: None)
+    allow_four_bits(monkeypatch.setattr)
     plan = replace(plan_of(name), base="nf4")
     trainer = Trainer(made_up.places(folder, weights[name], f"nf4-{name}"), plan)
     frozen = {n: p for n, p in trainer.network.named_parameters() if not p.requires_grad}

@@ -1,12 +1,15 @@
 """Run as a program by the tests: a training, or its gradients, in a process of its own.
 
-train: FOLDER WEIGHTS STEPS; gradients, sharded: FOLDER WEIGHTS FILE, of all processes of a group
-together, of which each holds all weights or a shard; sharded also trains, and goes on.
+train: FOLDER WEIGHTS STEPS; gradients, sharded, four-bits: FOLDER WEIGHTS FILE, of all processes
+of a group together, of which each holds all weights or a shard; sharded and four-bits also train,
+and go on. The last has a base in four bits, in bfloat16.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,7 @@ from objectmorpher_research.training.composition.lora_plan import LoraPlan  # no
 from objectmorpher_research.training.composition.train_lora import Course, Trainer  # noqa: E402
 
 PLAN = LoraPlan("qwen", made_up.SIDE, rate=1e-3, batch=2, mean=0.9, held_out=1, number="float32")
+FOUR_BITS = replace(PLAN, number="bfloat16", base="nf4")
 COURSE = Course(12, saved=4, looked=0)
 
 
@@ -45,13 +49,24 @@ def shard() -> None:
     train_lora.accelerator_of = sharded
 
 
+def allow_four_bits(patch: Callable[[object, str, object], None] = setattr) -> None:
+    """On the CPU, which bitsandbytes can and diffusers refuses."""
+    from diffusers.quantizers.bitsandbytes import BnB4BitDiffusersQuantizer
+
+    patch(BnB4BitDiffusersQuantizer, "validate_environment", lambda *_, **__: None)
+
+
 def main(what: str, folder: str, weights: str, last: str) -> None:
     torch.set_num_threads(1)
     made_up.small_conditions()
     name = {"train": "killed"}.get(what, what)
-    if what == "sharded":
+    plan = PLAN
+    if what in ("sharded", "four-bits"):
         shard()
-    trainer = Trainer(made_up.places(Path(folder), Path(weights), name), PLAN)
+    if what == "four-bits":
+        allow_four_bits()
+        plan = FOUR_BITS
+    trainer = Trainer(made_up.places(Path(folder), Path(weights), name), plan)
     if what == "train":
         trainer.train(COURSE)
         return
@@ -60,10 +75,10 @@ def main(what: str, folder: str, weights: str, last: str) -> None:
     found = {name: whole(grad).contiguous() for name, grad in grads.items()}
     if trainer.accelerator.is_main_process:
         save_file(found | {"loss": loss.reshape(1)}, last)
-    if what == "sharded":
+    if what in ("sharded", "four-bits"):
         assert all(hasattr(p, "full_tensor") for p in trainer.parameters.values())
         trainer.train(Course(2, saved=2, looked=2, sampled=1))
-        again = Trainer(trainer.places, PLAN)
+        again = Trainer(trainer.places, plan)
         assert again.step == 2
         again.train(Course(4, saved=4, looked=0))
 
