@@ -81,6 +81,19 @@ def test_going_from_tab_to_tab_changes_no_document(tabs: Editor) -> None:
     assert first.is_saved
 
 
+def test_a_tab_is_put_elsewhere_in_the_bar_and_changes_in_nothing(tabs: Editor) -> None:
+    kept = {tab: facts(tab) for tab in tabs.tabs.all}
+    way, order = random.Random(5), list(tabs.tabs.all)
+    for _ in range(20):
+        tab, at = way.choice(order), way.randrange(len(order))
+        shown = tabs.tab
+        tabs.tabs.move(tab, at)
+        order.remove(tab)
+        order.insert(at, tab)
+        assert list(tabs.tabs.all) == order and tabs.tab is shown
+    assert {tab: facts(tab) for tab in tabs.tabs.all} == kept
+
+
 def test_a_tab_that_is_left_holds_no_more_than_its_document(tabs: Editor) -> None:
     """What drawing takes is kept for the tab that was left last, so that one can go back."""
     first, second, third = tabs.tabs.all

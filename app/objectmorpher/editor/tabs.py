@@ -95,6 +95,11 @@ class Tabs:
         at = self.all.index(self._editor.tab)
         self.go(self.all[(at + by) % len(self.all)])
 
+    def move(self, tab: Tab, at: int) -> None:
+        """Puts a tab at another place of the bar."""
+        others = [other for other in self.all if other is not tab]
+        self.all = (*others[:at], tab, *others[at:])
+
     def close(self, tab: Tab) -> None:
         """Closes a tab for good; nothing is asked here. The last one becomes the start screen."""
         if len(self.all) == 1:

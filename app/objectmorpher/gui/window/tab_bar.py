@@ -34,7 +34,7 @@ def draw_tabs(editor: Editor, rect: Rect) -> None:
         edge((rect.x, low), (rect.x + rect.width, low))
         with small_text():
             for i, tab in enumerate(tabs):
-                imgui.push_id(i)
+                imgui.push_id(str(id(tab)))  # a tab that is dragged stays the one that is held
                 _draw_tab(editor, tab, Rect(rect.x + i * width, rect.y, width, rect.height))
                 imgui.pop_id()
         imgui.set_cursor_screen_pos(ImVec2(rect.x + len(tabs) * width + theme.pt(2), rect.y))
@@ -65,6 +65,10 @@ def _draw_tab(editor: Editor, tab: Tab, rect: Rect) -> None:
     if drawn_button("##tab", ImVec2(max(rect.width - beside, 1.0), rect.height)):
         editor.tabs.go(tab)
     mark(f"Tab: {name}")
+    if imgui.is_item_active() and imgui.is_mouse_dragging(imgui.MouseButton_.left):
+        by = int((imgui.get_mouse_pos().x - rect.x) // rect.width)  # places; 0 while on its own
+        at = editor.tabs.all.index(tab) + by
+        editor.tabs.move(tab, min(max(at, 0), len(editor.tabs.all) - 1))
     if imgui.is_item_hovered() and imgui.is_mouse_clicked(imgui.MouseButton_.middle):
         editor.filing.close(tab)
     tooltip(str(tab.path or tab.source or name))
