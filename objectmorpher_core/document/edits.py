@@ -215,13 +215,18 @@ def set_shape(document: Document, k: int, shape: LiftSettings) -> Document:
 def set_camera(document: Document, camera: Camera, k: int) -> Document:
     """The photo was taken by `camera`: its focal length became known from object `k`.
 
+    Further photos are forgotten: where they were taken from was found with the old one.
     Raises EditError where other objects were lifted with another one.
     """
     if camera == document.photo.camera:
         return document
     if any(item.lifted is not None for i, item in enumerate(document.objects) if i != k):
         raise EditError("the camera cannot change under objects that are lifted already")
-    return replace(document, photo=replace(document.photo, camera=camera))
+    objects = tuple(
+        replace(item, shape=replace(item.shape, views=())) if item.shape.views else item
+        for item in document.objects
+    )
+    return replace(document, photo=replace(document.photo, camera=camera), objects=objects)
 
 
 def nearest_control_point(lifted: LiftedObject, point: np.ndarray) -> int:

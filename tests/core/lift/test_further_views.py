@@ -10,7 +10,13 @@ import pytest
 
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.light.lighting import object_texture
-from objectmorpher_core.document.edits import add_object, set_lifted, set_mask
+from objectmorpher_core.document.edits import (
+    add_object,
+    set_camera,
+    set_lifted,
+    set_mask,
+    set_shape,
+)
 from objectmorpher_core.document.model import Document, LiftedObject, LiftSettings, Photo, Prompt
 from objectmorpher_core.document.sides import FurtherView
 from objectmorpher_core.lift import LiftError, LiftSubject
@@ -103,6 +109,16 @@ def test_a_photo_of_another_thing_is_refused():
     unlike = photo(ball(is_patterned=True), pose(5), LENS_CAMERA)
     with pytest.raises(LiftError, match="share too few details"):
         with_photo(subject(), ALONE, ReliefLifter(), other(unlike))
+
+
+def test_another_focal_length_forgets_further_photos():
+    one, camera = two_sides()[0], LENS_CAMERA
+    document = add_object(Document(Photo(Picture(one.pixels), camera, b"", "front.png")))
+    views = LiftSettings(views=(lifted()[2],))
+    document = set_shape(set_mask(document, 0, one.mask, Prompt()), 0, views)
+    assert set_camera(document, camera, 0).objects[0].shape.views == views.views
+    longer = set_camera(document, replace(camera, focal=2 * camera.focal), 0)
+    assert longer.objects[0].shape.views == () and longer.objects[0].mask is not None
 
 
 def test_a_session_keeps_further_photos():
