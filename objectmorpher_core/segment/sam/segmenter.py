@@ -14,7 +14,7 @@ from ... import models
 from ...base.arrays import F32, RGB, Mask
 from ...base.progress import Progress, part, silent
 from ...document.model import Click, Prompt
-from ...models import HubModel, ModelError
+from ...models import HubModel, ModelError, device
 from ...models.hub import EXTRA
 from ..salience import SubjectNet
 from ..selection import (
@@ -80,7 +80,7 @@ class Sam:
         if self._id:
             return models.hub_model(self._id) if models.place(self._id) else None
         found = models.installed(self._family)
-        if self._family != "sam-onnx" and len(found) > 1 and not has_gpu():
+        if self._family != "sam-onnx" and len(found) > 1 and not device.has_gpu():
             found = tuple(m for m in found if m.parameters <= WITHOUT_GPU) or found[-1:]
         return found[0] if found else None
 
@@ -230,13 +230,6 @@ def _has_torch() -> bool:
     return all(find_spec(name) is not None for name in ("torch", "transformers", "safetensors"))
 
 
-def has_gpu() -> bool:
-    """Whether PyTorch can use one here; imports it."""
-    from ...models import device
-
-    return device.has_torch() and device.devices()[0] != "cpu"
-
-
 def best() -> Sam | None:
     """The SAM that "auto" takes: the best that is here and not too slow; None where none is."""
     for family in ("sam2", "sam3", "sam", "sam-onnx"):
@@ -244,7 +237,9 @@ def best() -> Sam | None:
         if not models.installed(family) or found.missing() is not None:
             continue
         model = found.model()
-        if family == "sam-onnx" or (model and (model.parameters <= WITHOUT_GPU or has_gpu())):
+        if family == "sam-onnx" or (
+            model and (model.parameters <= WITHOUT_GPU or device.has_gpu())
+        ):
             return found
     return None
 
