@@ -142,7 +142,7 @@ with these scenes in view, the rule finds 36, 38 and 56 where it imagines 3, 4 a
 It was still improving when its time was over.
 
 On photographs: the saucer's shadow, the motorcycle's, and a bowl's in the sun, seen from above. Its
-shadow is its outline, beside itself; where its hard edge is, and how dark it is, the photo tells px
+shadow is its outline, beside itself; where its hard edge is, and how dark it is, the photo shows px
 for px.
 
 ![Photos with the shadow, without it, and with the thing moved and its new shadow](photos.jpg)

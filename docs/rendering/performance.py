@@ -61,7 +61,7 @@ EDITS = """
 
 With the embedded defaults: {backends}. Each photo is
 edited in a process of its own. Its *first* run opens the networks and loads the kernels in the
-stages that need them; what the process took to start is told apart. *Again* are the medians of
+stages that need them; what the process took to start is listed apart. *Again* are the medians of
 three more, as in the window. *sample* is the cup of the first start, *enlarged* the same photo with
 1.06 megapixels, *made* the photo of the frames below, half of which is its object. Seconds; the
 most memory that the process had used by then.
