@@ -36,7 +36,7 @@ TEXT = """# The shape network
 Made by `python docs/shape_network/make_card.py` from the figures of the training run.
 
 A silhouette cannot tell a box from a ball. This network looks at what is inside it: from the crop
-of a photo about an object, its mask, and DINOv2's patch tokens of the crop it estimates, for each of
+of a photo about an object, its mask, and DINOv2's patch tokens of the crop it states, for each of
 224 x 224 pixels, how near the front is, how far away the ray leaves the part that is seen and the
 whole object, the normal, whether the surface ends there before a farther part, and how far off all
 that is expected to be. The lifter joins it with the silhouette's own body, each as far as it is
@@ -94,8 +94,8 @@ How it does on meshes from elsewhere and on photographs stands in [lifting](../l
 ## Limits
 
 - It sees 224 pixels across: fingers and spokes of a large object are guessed from their outline.
-- Its world has twelve families. What is like none of them, or has a form of several, is described with
-  less sureness, and then nearer to the silhouette's.
+- Its world has twelve families. What is like none of them, or has a form of several, gets less
+  sureness, and is then nearer to the silhouette's.
 - Its photographs are few: backgrounds repeat, and materials are simpler than real ones. Glass and
   mirrors are hardly among them.
 - The back is a guess by kind: no photo shows what is behind.
