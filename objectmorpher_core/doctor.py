@@ -160,7 +160,7 @@ def _lifting() -> StageReport:
 
 
 def _workers() -> list[tuple[str, str, bool]]:
-    """The user's own lifters: name, what is told of it, whether it can run."""
+    """The user's own lifters: name, description, whether it can run."""
     found = []
     for name in worker_file.worker_names():
         try:

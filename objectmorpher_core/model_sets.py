@@ -184,5 +184,5 @@ def _step(id: str, card: Card) -> SetStep:
 
 
 def _beside(wanted: ModelSet, id: str) -> str:
-    """The model that an adapter lies beside: the one that is told instead of it."""
+    """The model that an adapter lies beside: the one whose name it holds."""
     return next(other for other, instead in wanted.instead.items() if instead and other in id)

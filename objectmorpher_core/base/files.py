@@ -205,7 +205,7 @@ def _rename_all(written: list[tuple[Path, Path]]) -> None:
 
 
 def _bring_back(renamed: list[Path], olds: dict[Path, Path]) -> Iterator[tuple[Path, Path | None]]:
-    """Undoes renames; tells of those that the disk keeps, whose old files stay then."""
+    """Undoes renames; reports those that the disk keeps, whose old files stay then."""
     for done in renamed:
         old = olds.get(done)
         try:

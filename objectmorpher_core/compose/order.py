@@ -88,7 +88,7 @@ def back_to_front(document: Document, splats: Mapping[int, PosedSplats | None]) 
 
     The nearer is in front: what stands lower in the picture, and what stands on a plate is nearer
     than that. Of two alike the later is in front: a copy that was moved aside. What has no
-    Gaussians, for it was told to stay in front, is the nearest.
+    Gaussians, because it is to stay in front, is the nearest.
     """
     if len(splats) < 2:  # as in most drags
         return list(splats)

@@ -133,7 +133,7 @@ class PaintedShare:
         alpha = unit_pixels(paint.crop((left, top, left + width, top + height))[..., 3:])
         levels = build_levels(np.repeat(alpha, 3, axis=2), texture.levels[0][..., 3], left, top)
         spots = np.repeat(paint.spots[:, 3:] / np.float32(255), 3, axis=1)
-        if len(spots) == len(splats):  # else some were split, whose paint is told with the texture
+        if len(spots) == len(splats):  # else some were split, whose paint comes with the texture
             splats = splats.recoloured(spots)
         return PaintedShare(tiles.prepare(splats, camera, camera), levels)
 

@@ -165,7 +165,7 @@ class LiftSettings:
     nearness: F32 | None = None  # (h, w) x its size, towards the camera; stretched over the photo
     horizon: float | None = None  # px, the row of the photo it lies in; None: not known
     uses_depth: bool = True  # whether a depth network, where one is installed, may tell its relief
-    trust: float = 1.0  # in the shape network, of [0, 1]; 0: the silhouette alone tells the shape
+    trust: float = 1.0  # in the shape network, of [0, 1]; 0: the silhouette alone gives the shape
     kind: str = "auto"  # of KINDS: what it is
     views: tuple[FurtherView, ...] = ()  # further photos of it
 

@@ -78,7 +78,7 @@ def down_at(
 ) -> F64 | None:
     """(3,) world, unit: what is down where an object stands at rest; None: nothing is known.
 
-    What its shape says counts more than the horizon, and what one is told more than both.
+    What its shape says counts more than the horizon, and what the user says more than both.
     """
     if seen_from is None and lifted.up is not None:
         return -(lifted.world_from_object[:3, :3] @ np.array(lifted.up)) / lifted.scale

@@ -23,7 +23,7 @@ from .weight_folder import PLAIN
 # The official networks of measures: the user's files, and their verification.
 #
 # No package that we may fetch from carries them. They are published under names that end in the
-# first digits of their SHA-256, so that a file can be told from another.
+# first digits of their SHA-256, so that files can be distinguished.
 
 FOLDER = "evaluation"  # among the models in the cache
 

@@ -131,7 +131,7 @@ def _free_main_memory() -> int | None:
         pass  # not Linux
     if sys.platform == "win32":
         return _free_on_windows()
-    try:  # macOS: pages that are free or can be dropped are not told apart; half is cautious
+    try:  # macOS: pages that are free or can be dropped are not distinguished; half is cautious
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     except (ValueError, OSError, AttributeError):
         return None

@@ -159,7 +159,7 @@ def _fetch(place: Path, url: str, expected: dict[str, Any], get: Get) -> str:
     place.parent.mkdir(parents=True, exist_ok=True)
     growing = place.with_name(place.name + PART)
     if place.exists():
-        os.replace(place, growing)  # an older try; what it is its hash tells
+        os.replace(place, growing)  # an older try; its hash says what it is
     size = expected["size"]
     if growing.exists() and growing.stat().st_size > size:
         growing.unlink()
@@ -235,6 +235,6 @@ if __name__ == "__main__":
         main(json.loads(sys.argv[1]))
     except _Failure as failure:
         _say(error=failure.args[0], detail=failure.args[1])
-    except Exception as error:  # whatever it was is told in one line
+    except Exception as error:  # whatever it was is reported in one line
         kind, detail = _kind_of(error)
         _say(error=kind, detail=detail)

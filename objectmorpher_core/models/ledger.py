@@ -227,7 +227,7 @@ class Ledger:
             others = [e for e in self._idle() if e.holds(plan.device)]
             for other in others:
                 self._close(other)
-            log.warning("Memory ran out %s", plan.told)
+            log.warning("Memory ran out %s", plan.in_words)
             if not others:
                 self._full[model.made_of, plan] = room or 0
             return bool(others)
@@ -235,7 +235,7 @@ class Ledger:
     def _too_small(self, model: Model[Any], ways: list[Plan], entry: _Entry) -> str:
         """Why no way is left, as a sentence with numbers."""
         plan = min(ways, key=lambda way: way.peak)
-        told = f"there is not enough memory {plan.told} for {model.name}"
+        told = f"there is not enough memory {plan.in_words} for {model.name}"
         for where in _places(plan):
             room, takes = self._room(where, entry, is_all=True), plan.takes(where)
             if room is not None and takes > SPARE * room:

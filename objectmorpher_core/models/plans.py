@@ -45,7 +45,7 @@ class Plan:
         return self.kept > 0
 
     @property
-    def told(self) -> str:
+    def in_words(self) -> str:
         """Return the plan in words."""
         return f"on {device.NAMES[self.device]} with {self.number}{TOLD[self.way]}"
 

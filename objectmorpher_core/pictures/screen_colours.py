@@ -1,4 +1,4 @@
-"""A photo's colours as a screen has to be told them, by their ICC profiles."""
+"""A photo's colours as a screen needs them, by their ICC profiles."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ from .salience import DEVIATION, MEAN
 WEIGHT = "dinov2-vits14"
 IMAGES = "input_image"
 TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the class token first
-# What is about half way still tells where surfaces face (R^2 of normals by ridge regression from
-# one layer: 2 0.31, 5 0.44, 8 0.46, 10 0.40, the last 0.37); the last tells what things are.
+# A layer about half way still shows where surfaces face (R^2 of normals by ridge regression from
+# one layer: 2 0.31, 5 0.44, 8 0.46, 10 0.40, the last 0.37); the last shows what things are.
 INNER = tuple(f"/backbone/encoder/layer.{k}/Add_1_output_0" for k in (5, 8))
 PATCH = 14  # px
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect

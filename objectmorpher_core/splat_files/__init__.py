@@ -134,7 +134,7 @@ def _check_file(path: Path) -> None:
 
 
 def _is_mesh(path: Path) -> bool:
-    """True where the file's surface is sampled; a .ply may be anything, its header tells."""
+    """True where the file's surface is sampled; what a .ply is, its header says."""
     ending = ending_of(path)
     if not ending.endswith(".ply"):
         return ending in MESH_ENDINGS

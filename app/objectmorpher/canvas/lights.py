@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 STILL = 0.12  # s without a change, after which the shadow is the exact one
 SEEN = 1 / 255  # of a factor: less is not seen
-LOOKED = 500  # Gaussians of an object, by which one tells whether a shadow comes near it
+LOOKED = 500  # Gaussians of an object, that show whether a shadow comes near it
 SMALL = 1024  # px, longer side of the picture of what was repaired
 
 

@@ -105,7 +105,7 @@ def build_ready_shape(camera: Camera, thing: EditObject) -> CanvasShape:
     shape.is_rehearsed = True
     try:
         rehearse(shape, camera, thing.placement)
-    except Exception:  # it is shown all the same; whoever drags it is told
+    except Exception:  # it is shown all the same; dragging it shows the message
         log.exception("%s could not be made ready to be dragged", thing.name)
     return shape
 

@@ -108,7 +108,7 @@ def _get_set(id: str, options: argparse.Namespace) -> None:
     """All of a set: first what each would do here, then one question."""
     found = next(o for o in model_sets.offers() if o.set.id == id)
     for step in found.steps:
-        how = step.plan.told if step.plan else step.why_not or "beside the others"
+        how = step.plan.in_words if step.plan else step.why_not or "beside the others"
         _write(f"{step.model.id:<{WIDE}}{_size(step.model.size):>10}  {step.model.licence}, {how}")
     told = f"{id}: {_size(found.missing)} to download, licences {', '.join(found.licences)}"
     if found.missing:
@@ -165,7 +165,7 @@ def _ask(wanted: Sequence[HubModel], is_agreed: bool) -> None:
 
 
 def _consent(told: str, id: str, is_agreed: bool, verb: str = "download") -> None:
-    """The user's word on what is told. Raises UsageError without it."""
+    """The user's consent to what is asked. Raises UsageError without it."""
     if is_agreed:
         sys.stderr.write(f"{told}\n")
         return
@@ -178,7 +178,7 @@ def _consent(told: str, id: str, is_agreed: bool, verb: str = "download") -> Non
 
 
 def _look(action: str, id: str | None) -> None:
-    """Lists, tells the places of, or hashes one of them or all."""
+    """Lists one of them or all, prints their places, or hashes them."""
     workers = tuple(name for name in worker_file.worker_names() if id in (None, name))
     others = {known.id for known in (*models.KINDS, *models.hub_models(), *models.trunks())}
     is_worker = id is not None and bool(workers)

@@ -60,7 +60,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _told(error: Exception, command: str) -> str:
-    """What the user is told of it; a fault of ours is told in full in the log."""
+    """What the user reads of it; the log has a fault of ours in full."""
     if isinstance(error, FAILURES) and not is_librarys(error):
         return failure_sentence(error)
     from ..system.logs import log_path

@@ -204,7 +204,7 @@ class Candidates:
         )  # fmt: skip
 
     def _look_closer(self, shown: Candidate) -> None:
-        """The candidate told better, where it can be."""
+        """The candidate refined, where it can be."""
         if shown.found.is_final:
             return
 

@@ -55,7 +55,7 @@ class Combine(Enum):
     """How an answer is combined with the selection that is there."""
 
     ANEW = "anew"  # instead of it
-    REFINED = "refined"  # the same, told better
+    REFINED = "refined"  # the same, refined
     ADDED = "added"
     REMOVED = "removed"
 

@@ -134,7 +134,7 @@ def same_scene(a: Any, b: Any) -> bool:
 
 
 class ScreenPass:
-    """Draws the canvas in the colours that the screen has to be told."""
+    """Draws the canvas in the colours that the screen needs."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context

@@ -342,7 +342,7 @@ class ServiceHandler(Handler):
 
 
 class _Conversation:
-    """One job: its progress told line by line, its answer, and its end with the connection's."""
+    """One job: its progress line by line, its answer, and its end with the connection's."""
 
     def __init__(self, handler: ServiceHandler, call: Call) -> None:
         self._handler, self._call = handler, call

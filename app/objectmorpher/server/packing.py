@@ -21,7 +21,7 @@ from objectmorpher_core.models.ledger import SPARE, Ledger, Model
 from .offers import Offers, look_at_offers
 
 ALSO = {"depth": "lift"}  # stages of models that work in another one
-FINEST = 1000  # parts of a GPU that are told apart
+FINEST = 1000  # parts of a GPU that are counted
 GLIMPSE = 0.01  # of a GPU, to look at one
 
 

@@ -35,7 +35,7 @@ KEPT = 8  # large arrays in Ray's store
 PHOTOS = 4  # that a process has read and remembers
 WAIT = 0.1  # s between two looks at whether a call is still wanted
 BEAT = 0.1  # s between two looks at a running job
-STARTED, PROGRESS, DONE = "started", "progress", "done"  # what a process tells of a job
+STARTED, PROGRESS, DONE = "started", "progress", "done"  # what a process reports of a job
 
 
 class Stages:

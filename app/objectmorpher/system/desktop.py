@@ -34,7 +34,7 @@ def read_profile(path: Path) -> bytes | None:
 
 
 def system_profile() -> bytes | None:
-    """Return the main screen's profile; None where the system tells none."""
+    """Return the main screen's profile; None where the system names none."""
     try:
         if sys.platform == "win32":
             return _of_windows()

@@ -133,7 +133,7 @@ def _open(photo: Path | None) -> None:
         begun = dino_tokens.expect_tokens(rgb), salience.expect_salience(rgb)
         for compute in begun:
             compute()
-    except Exception as error:  # whoever needs the network opens it again, and tells
+    except Exception as error:  # whoever needs the network opens it again, and reports it
         log.debug("DINOv2 did not begin early: %s", error)
 
 

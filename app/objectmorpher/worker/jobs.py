@@ -106,7 +106,7 @@ class Jobs(Executor):
         self._warm, self._wake = warm, wake
         self._worker: Worker | None = Worker(warm, wake)
         self._deaths = 0  # processes in a row that ended without a word
-        self.restarted: Callable[[], None] = lambda: None  # told that the worker's memory is lost
+        self.restarted: Callable[[], None] = lambda: None  # called when the worker's memory is lost
         self._waiting: dict[str, Request] = {}  # kind -> newest request, in the order they came
         self.current: Request | None = None
         self.elsewhere: Elsewhere | None = None  # what has jobs done by a server
@@ -277,7 +277,7 @@ def work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Path
             answer = "failed", number, JobError.of(error, function.__name__)
         try:
             writer.write(answer)
-        except BrokenPipeError:  # the window was killed: nobody is there to be told
+        except BrokenPipeError:  # the window was killed: nobody is there to listen
             os._exit(0)
         except Exception as error:  # such as an answer that cannot be sent
             writer.write(("failed", number, JobError.of(error, function.__name__)))

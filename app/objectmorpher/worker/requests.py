@@ -160,7 +160,7 @@ class Executor(ABC):
         """The program ends."""
 
     def _numbered(self, request: Request) -> Request:
-        """Answers are told apart by their numbers."""
+        """Answers are matched by their numbers."""
         self._count += 1
         request.number, request.started = self._count, time.monotonic()
         return request

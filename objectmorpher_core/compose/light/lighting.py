@@ -282,13 +282,13 @@ def _normal_under(
     return down
 
 
-# Where the light on an object comes from, told from the photo without any weights.
+# Where the light on an object comes from, found in the photo without any weights.
 
 CELLS = 22  # along the longer side of an object: what the light is estimated from
 LOOKED = 8  # px of the photo for each of them are enough
 FULL = 0.4  # of a cell, from which it is asked
 LEAST_CELLS = 12
-DARK = 0.02  # encoded luminance: below it nothing is told
+DARK = 0.02  # encoded luminance: below it nothing is known
 PATCH = 0.3  # x the object's longer side, over which its colours are alike
 GRAIN = 0.4  # share of their variance that is a cell's own
 COLOURS = 0.3  # standard deviation of them that is expected, logarithm

@@ -109,7 +109,7 @@ class OnnxNetwork:
         return dict(zip(names, (image, 1 - known), strict=True))
 
     def _unit(self, answer: np.ndarray, seen: F32) -> F32:
-        """The answer in [0, 1]; what is `seen` tells in which numbers it comes."""
+        """The answer in [0, 1]; it comes in the range of numbers of what is `seen`."""
         if answer.dtype == np.uint8:
             return np.asarray(answer, np.float32) / np.float32(255)
         if self._family == "migan":

@@ -107,7 +107,7 @@ class SelfLambda(nn.Module):
 
 
 class CrossLambda(nn.Module):
-    """Tokens (B, side^2, C) that see the vectors (B, IDS / 2, D) that are told."""
+    """Tokens (B, side^2, C) that see the given vectors (B, IDS / 2, D)."""
 
     def __init__(self, channels: int, heads: int, told: int, side: int) -> None:
         super().__init__()

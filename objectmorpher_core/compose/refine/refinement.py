@@ -201,7 +201,7 @@ def _f32(picture: np.ndarray) -> F32:
 CONTEXT = 0.35  # x the size of the edit, of the photo around it that the refiner sees
 LEAST_CONTEXT = 32  # px
 LEAST_SIDE = 64  # px of the crop
-LEAST_STILL = 400  # px outside the footprint from which a drift can be told
+LEAST_STILL = 400  # px outside the footprint from which a drift can be measured
 MOST_GAIN = 1.5  # a drift is no larger, else it is no drift
 OUTLIERS = 0.2  # share of the pixels that differ most, which do not count
 
@@ -320,7 +320,7 @@ def measure_drift(found: F32, meant: F32, alpha: F32) -> Drift:
             kept = away <= np.quantile(away, 1 - OUTLIERS)
             u, v = x[kept].astype(np.float64), y[kept].astype(np.float64)
             spread = float(u.var())
-            if spread < 1e-4:  # one flat colour tells no gain
+            if spread < 1e-4:  # one flat colour shows no gain
                 gain, offset = 1.0, float((v - u).mean())
                 continue
             gain = float(((u - u.mean()) * (v - v.mean())).mean()) / spread

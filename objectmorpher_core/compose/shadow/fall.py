@@ -30,7 +30,7 @@ AT_FOOT = 0.08  # x the caster's height: what is seen so near its foot may carry
 FLAT = 0.06  # x the caster's height: what rises less is the ground
 FARTHEST = 40.0  # x as far as the foot: no shadow is seen there
 LOOKED = 24  # places across the ground before a foot, and as many along it
-EIGHTH = 8  # one point in so many tells where a shadow is
+EIGHTH = 8  # one point in so many is enough to find where a shadow is
 ROOM = 0.15  # x the caster's height, around those
 FEWEST = 4  # Gaussians that must be seen there
 
@@ -79,7 +79,7 @@ class Caster:
         return map_coordinates(self.seen, [y, x], np.float64, order=1, mode="nearest")
 
     def _scale(self) -> tuple[float, float] | None:
-        """Factor and shift of the inverse depth, by the ground before the foot; None: not told."""
+        """Factor and shift of the inverse depth, by the ground before the foot; None: unknown."""
         standing, camera = self.standing, self.standing.camera
         foot, size = standing.foot, standing.height
         across = size * np.linspace(-1, 1, LOOKED)

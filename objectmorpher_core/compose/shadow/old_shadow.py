@@ -32,25 +32,25 @@ from .shadow import GAMMA
 # texture.
 
 HALF = 0.5  # of the light that is missing near by: there the edge is
-NEAR_BY = 4.0  # cells, over which that is told
+NEAR_BY = 4.0  # cells, over which that is measured
 FAR = 4.0  # cells: the ground beyond is lit as it should be
 ALONG = 3.0  # cells, over which one averages along the edge
 FIRST, GROWTH = 1.0, 1.5  # px between distances at the edge, and x from each to the next
-LEAST = np.float32(1e-3)  # of the px around, that must be at a distance for its light to be told
+LEAST = np.float32(1e-3)  # of the px around, that must be at a distance for its light to be known
 MOST = 1.6  # x, that any light is changed by
-FEW, MANY = 3.0, 12.0  # px per cell, of a coarser picture on which something is told
+FEW, MANY = 3.0, 12.0  # px per cell, of a coarser picture on which something is measured
 SMALL = 12.0  # px: a wider blur is one of a smaller picture
 DIM = -3.2  # natural logarithm of light, from which a dark ground shows what it looks like
-DIM_OVER = 0.5  # cells, over which that is told
+DIM_OVER = 0.5  # cells, over which that is measured
 LIT = 0.05  # natural logarithm of missing light, from which ground is not lit
 CONTINUED = (2.0, 4.0, 8.0, 16.0)  # cells; each weighs a hundredth of the one before
 ROOM = 0.7  # cells, over which ground is not lit more than it usually is
-FINE_EDGE = 0.15  # cells, over which the dark of a px is told
+FINE_EDGE = 0.15  # cells, over which the dark of a px is measured
 DARK, LEFT = 1.1, 0.5  # natural logarithm of light that lacks in all, and after it was given back
 LOOKS = 12.0  # cells, as far as all this looks around the shadow
 MOST_TINT = 0.4  # of what is missing, that a colour may lack more or less
-SHOWS = -3.0  # natural logarithm of light, from which it has a colour that is to be told
-OFF = 0.1  # natural logarithm: so much is usual that the light was told wrong by
+SHOWS = -3.0  # natural logarithm of light, from which it has a colour that can be measured
+OFF = 0.1  # natural logarithm: the usual error of the light that was found
 SEEN_EDGE = 0.02  # natural logarithm of light: less is no shadow
 
 
@@ -171,9 +171,9 @@ def _factor(lit: F32, missing: F32, free: Mask, pitch: float) -> F32:
 
 
 def _trust(lit: F32, usual: F32, beyond: Mask, width: float, sigma: float) -> float:
-    """How much the mean of a strip along the edge tells of its light, and not of the ground.
+    """How much the mean of a strip along the edge depends on its light, and not on the ground.
 
-    As much as lit ground itself varies over pieces as large tells of the ground.
+    Lit ground itself varies so much over pieces as large.
     """
     side = float(np.sqrt(width * 2 * np.sqrt(np.pi) * sigma / (4 * np.pi)))
     grey = np.where(beyond, lit.mean(-1), 0).astype(np.float32)
@@ -222,9 +222,9 @@ BLACK = 0.02  # of linear light, below which a logarithm says little
 REACH = 2.0  # cells of what is missing, over which it is sharpened
 FROM_ABOVE = 90.0  # degrees: the shadow is the outline itself
 HARD = 0.9  # natural logarithm of missing light, from which an edge is looked for in the photo
-WIDE = 3.0  # cells, over which the light on either side of an edge is told
+WIDE = 3.0  # cells, over which the light on either side of an edge is measured
 SIDES = (0.15, 0.85)  # of what is missing there, that is lit ground, or all in shadow
-FINE = 0.1  # cells, over which a px's light is told
+FINE = 0.1  # cells, over which a px's light is measured
 LEAST_SIDE = np.float32(0.01)  # of the px around: so much its usual light weighs
 MOSTLY = 0.5  # of a cell that is ground
 SURE_EDGE = (0.3, 0.7)  # of the way from lit to shaded: what is between belongs to both
@@ -264,7 +264,7 @@ def without_shadow(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Ma
 def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mask]:
     """As `without_shadow`, and where it is so dark that the photo shows little of the ground.
 
-    Where a hard edge tells how dark it is, ground that is darker still shows enough.
+    Where a hard edge shows how dark it is, ground that is darker still shows enough.
     """
     height, width = pixels.shape[:2]
     around = _grown(old.bounds(width, height), LOOKS * old.pitch, width, height)

@@ -212,7 +212,7 @@ def _tint(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> float
     return max(changes) / max(found.dark, 1e-6)
 
 
-SHEET_GROUND = 30.0  # degrees: a silhouette alone is told no ground
+SHEET_GROUND = 30.0  # degrees: a silhouette alone shows no ground
 CELLS = 64  # along the object's longer side
 AROUND = 1.0  # x that side, how far around the object one looks
 NEAR = 0.6  # x that side, over which what is seen weighs less
@@ -493,7 +493,7 @@ def _of_one_colour(seen: Surroundings, ground: ShadowGround, found: TriedShadow)
     is_told = lightest > np.log(SHOWS)
     is_ground = np.ones(seen.cover.shape, np.uint8)
     if lit.sum() > LEAST_CELLS:
-        basis = ground.basis[lit, :3]  # a plane: what is curved runs away where it is not told
+        basis = ground.basis[lit, :3]  # a plane: what is curved runs away where nothing is seen
         for channel in np.moveaxis(seen.colour, -1, 0):
             values = channel.ravel()[ground.index].astype(np.float64)
             usual, _, spread = regressed(basis, values[lit], ground.weight[lit])

@@ -33,7 +33,7 @@ class Flat:
     """A silhouette that lies on the ground, seen from straight above; in px of its grid."""
 
     alpha: F32  # (h, w)
-    height: float  # its shorter side in the picture: what lengths of its shadow are told in
+    height: float  # its shorter side in the picture: the unit of its shadow's lengths
 
     @property
     def base(self) -> float:

@@ -126,7 +126,7 @@ def place_import(
 # difference there continues over what the photo does not show, and fades with the distance: the two
 # meet without a seam.
 
-SURE = 0.5  # visibility of a Gaussian that tells something about the light
+SURE = 0.5  # visibility of a Gaussian that shows something of the light
 OPAQUE = 0.95  # alpha of the matte, likewise
 LEAST = 12  # such Gaussians
 GLANCE = 4.0  # what is seen at a glance only has the photo's colour all the same

@@ -123,7 +123,7 @@ class _Problem:
         """A step (7,) that lowers the energy, None where none does, and the next damping."""
         residual, jacobian = self.linearised(stance, picture, light)
         hessian, gradient = jacobian.T @ jacobian, jacobian.T @ residual
-        # By the mean of the diagonal, too: what the picture hardly tells must not run away.
+        # By the mean of the diagonal, too: what the picture hardly shows must not run away.
         diagonal = np.diag(hessian) + 0.05 * np.diag(hessian).mean()
         while damping < MOST_DAMPING:
             step = -np.linalg.solve(hessian + np.diag(damping * diagonal + 1e-12), gradient)
@@ -202,7 +202,7 @@ class Level:
 LEVELS = (Level(40, 800, 36, 5), Level(80, 3_000, 10, 7), Level(160, 8_000, 4, 10))
 SAME = math.radians(10.0)  # rotations that are nearer to one another are one pose
 PROPOSALS = 3
-NOISE = 0.01  # of scores: poses that differ by less cannot be told from one another
+NOISE = 0.01  # of scores: poses that differ by less cannot be distinguished
 
 
 @dataclass(frozen=True, eq=False)

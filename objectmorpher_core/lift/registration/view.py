@@ -14,7 +14,7 @@ from ...base.rotations import matrix_from_vector
 from .. import LiftError
 from .sketch import COLOR, COVERAGE, NORMAL, Surfels, sketch
 
-LEAST_AREA = 64  # px: a smaller mask tells no pose
+LEAST_AREA = 64  # px: a smaller mask shows no pose
 MARGIN = 0.12  # x the mask's longer side: what is seen around it
 BEYOND = (0.05, 0.4, 1.0)  # x its size: how far an object may go on outside the photo
 EDGE = 3.0  # x its slope: how much sharper edges are made before silhouettes are compared

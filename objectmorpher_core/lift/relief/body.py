@@ -159,7 +159,7 @@ def _share(prism: Prism, xy: F64, extent: float) -> F64:
 
 # What a body leans more than the network sees: of the plane nearest to its front.
 #
-# A photo hardly tells how far a thing leans. Who must answer so that the mean absolute error is
+# A photo hardly shows how far a thing leans. Who must answer so that the mean absolute error is
 # the least gives the median of what it may be, which is less, whichever way it leans; and what is
 # blended with an upright silhouette leans less again. What such a blend lacks was measured on 150
 # views of made solids and of meshes that the network was not trained on. Where the network sees a

@@ -132,7 +132,7 @@ def fused(
     outline = body.silhouette
     halves = [_half(side, outline) / thickness for side in (body.front, body.back)]
     sheets = sheets_of(seen, camera, outline)
-    # How far away it is neither tells: both fronts are, in the mean. Away from the camera all
+    # Neither says how far away it is: both fronts are, in the mean. Away from the camera all
     # grows alike, and the picture stays.
     means = [
         float(front[outline.inside].mean()) for front in (body.middle + halves[0], sheets.front)

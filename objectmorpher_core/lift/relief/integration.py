@@ -14,7 +14,7 @@ from ...base.arrays import F32, F64, Mask
 from ...base.kernel_files import numba
 
 SLOPE_ERROR = 0.25  # expected, of the normals: change of depth per length across the ray
-GRAZING = 0.2  # cosine to the ray, below which a normal tells no slope
+GRAZING = 0.2  # cosine to the ray, below which a normal shows no slope
 ROUNDS = 120  # of conjugate gradients
 CLOSE = 1e-4  # x the first residual: near enough
 

@@ -62,7 +62,7 @@ class ReliefLifter:
     def __init__(
         self, look: Look = look, shape: Shaper = ReliefBody.of, see: See = shape_look.look
     ) -> None:
-        """`look` tells the depth of what is seen: by default as an installed network does.
+        """`look` estimates the depth of what is seen: by default as an installed network does.
 
         `shape` makes the body of a silhouette, and `see` tells more of it: by default as the
         program's own network does.

@@ -100,7 +100,7 @@ class _View:
         return np.asarray(self.camera.project(self.places), np.float64)
 
     def drawn(self, rest: RestSplats, matte: Matte, photo: Camera) -> _Picture:
-        """What the photo tells of this view; `rest` has the colours of what it does not.
+        """What the photo shows of this view; `rest` has the colours of what it does not.
 
         The outline is the surface's own, and the photo is not faded where it is drawn out.
         """

@@ -15,7 +15,7 @@ from .silhouette import TOUCHING, ReliefSilhouette, lower_hull
 #
 # Where the outline rises straight from both ends of its contact with the ground, the contact is the
 # front of a box or a cylinder, and the plan of that front is known from a single photo. How far the
-# sides lean together tells how far the camera looks down, for they are plumb.
+# sides lean together shows how far the camera looks down, for they are plumb.
 
 SIDES = (0.2, 0.7)  # x height of the silhouette above its foot: where a prism's sides are seen
 SIDE_ROWS = 25
@@ -253,7 +253,7 @@ class GroundPlane:
 
 # Where an object touches the ground follows from its silhouette alone: the lower convex hull, as
 # far as the outline lies on it, or bridges the gap between two feet that are about level. Seen
-# from above (the plan), a line through those places tells which end is nearer.
+# from above (the plan), a line through those places shows which end is nearer.
 
 STEEPEST = 0.9  # slope of the outline in the photo, beyond which it leaves the ground
 STEEPEST_BRIDGE = 0.35  # likewise of a line between two feet

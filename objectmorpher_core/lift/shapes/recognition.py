@@ -42,7 +42,7 @@ FLATNESS = (-2.71, -3.25, -12.6)
 RECTANGLE = 1.5  # log odds, of an outline that is one in perspective
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
 EXPLAINED = 0.95  # weight, from which no other shape is tried
-STANDS, LYING = 0.5, 0.5  # weight of a shape that tells what is up, and cosine to the upright
+STANDS, LYING = 0.5, 0.5  # weight of a shape that shows what is up, and cosine to the upright
 LEAST_SURE = 20  # cells, from which anything is recognised
 SECOND = 0.1  # x what is seen of a box, of its second side
 
@@ -221,7 +221,7 @@ def completed(
     if shape.plane is not None:
         share = np.full(outline.shape, trust * places.weight)
         return _as_sheet(body, near - SHEET * outline.extent, share, thickness)
-    # How it leans the shape tells better than a network, also of what sticks out of it.
+    # The shape shows how it leans better than a network does, also of what sticks out of it.
     lean = _plane(near - front, compared, outline)
     body = replace(body, middle=body.middle + trust * places.weight * lean)
     share = trust * _share(places, front + lean - near, body)

@@ -153,7 +153,7 @@ class Generator(InParts):
         )
 
     def _seen(self, picture: ConditionPicture) -> Tensor:
-        """(1, M, D) what the flows are told."""
+        """(1, M, D) what conditions the flows."""
         encoder = self._encoder()
         return encoder.tokens(picture.on_black(encoder.side))
 

@@ -56,8 +56,8 @@ class TripoSplatGenerator(InParts):
             with torch.inference_mode():
                 progress(0.0, "Looking at the object")
                 rgb = torch.from_numpy(picture.on_black(SIDE)).permute(2, 0, 1)[None]
-                told = self.told(rgb.to(self.device), noise)
-                latents = self._latents(told, noise, part(progress, 0.05, 0.95))
+                condition = self.condition(rgb.to(self.device), noise)
+                latents = self._latents(condition, noise, part(progress, 0.05, 0.95))
                 progress(0.95, "Making Gaussians")
                 decoder = self.held("decoder", lambda: self._part(networks.Decoder, DECODER))
                 return decoder.decode(latents, count, noise)
@@ -71,8 +71,8 @@ class TripoSplatGenerator(InParts):
             if not self.plan.keeps:
                 self.release()
 
-    def told(self, rgb: Tensor, noise: torch.Generator) -> Tensor:
-        """(1, M, seen + drawn) of a picture (1, 3, SIDE, SIDE) in [0, 1]: what the flow is told."""
+    def condition(self, rgb: Tensor, noise: torch.Generator) -> Tensor:
+        """(1, M, seen + drawn) of a picture (1, 3, SIDE, SIDE) in [0, 1]: the flow's condition."""
         mean, std = (rgb.new_tensor(v)[:, None, None] for v in (MEAN, STD))
         dino = self.held("dino", self._dino)
         seen = unit_layer_norm(dino(pixel_values=(rgb - mean) / std).last_hidden_state)
@@ -87,15 +87,15 @@ class TripoSplatGenerator(InParts):
         before = seen.shape[1] - drawn.shape[1]  # tokens that are not of the picture's patches
         return torch.cat([seen, functional.pad(drawn, (0, 0, before, 0))], 2)
 
-    def _latents(self, told: Tensor, noise: torch.Generator, progress: Progress) -> Tensor:
+    def _latents(self, condition: Tensor, noise: torch.Generator, progress: Progress) -> Tensor:
         flow = self.held("flow", lambda: self._part(networks.Flow, FLOW))
-        form, nothing = flow.form, torch.zeros_like(told)
+        form, nothing = flow.form, torch.zeros_like(condition)
         start = torch.randn(1, form.tokens, form.channels, generator=noise)
         camera = torch.randn(1, 1, form.camera, generator=noise)
         camera = functional.pad(camera, (0, form.channels - form.camera))
 
         def velocity(x: Tensor, time: Tensor, is_shown: bool) -> Tensor:
-            return flow(x, time, told if is_shown else nothing)
+            return flow(x, time, condition if is_shown else nothing)
 
         packed = torch.cat([start, camera], 1).to(self.device)
         return sample(velocity, packed, SAMPLING, progress, "Making the object")[:, :-1]

@@ -175,11 +175,11 @@ class Flow(NetworkPart):
         self.out_layer = nn.Linear(width, form.channels)
         self.cam_out_layer = nn.Linear(width, form.camera)
 
-    def forward(self, x: Tensor, time: Tensor, told: Tensor) -> Tensor:
-        """At `time` (B,) in thousandths; `told` (B, M, seen + drawn) of the picture."""
+    def forward(self, x: Tensor, time: Tensor, condition: Tensor) -> Tensor:
+        """At `time` (B,) in thousandths; `condition` (B, M, seen + drawn) of the picture."""
         own, count = self.precision, x.shape[1] - 1
         latents, camera = x[:, :-1].to(own), x[:, -1:, : self.form.camera].to(own)
-        seen, drawn = told.to(own).split((self.form.seen, self.form.drawn), 2)
+        seen, drawn = condition.to(own).split((self.form.seen, self.form.drawn), 2)
         code = self.t_embedder(time)
         timed = self.adaLN_modulation(code)
         h = self.input_layer(latents) + _marks(count, self.form.width).to(x.device, own)

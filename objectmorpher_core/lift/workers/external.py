@@ -298,7 +298,7 @@ def read_answer(folder: Path, name: str, count: int) -> tuple[Gaussians, WorkerV
         if declared is not None and len(made) < (1 - LOST) * declared:
             lost = f"{declared - len(made):,} of {declared:,} Gaussians"
             raise SplatFileError(f"{at.name}: {lost} have values that are not numbers")
-        if seen is None:  # a pose is told of the frame of the file; without one any frame will do
+        if seen is None:  # a pose refers to the frame of the file; without one any frame will do
             made = read_object(at, count)
     except (SplatFileError, OSError) as error:
         raise LiftError(f"what the worker {name} made cannot be used: {reason(error)}") from error

@@ -4,7 +4,7 @@
 
     name = "sam3d"                                  # for --lift sam3d
     command = ["{here}/env/bin/python", "{here}/worker.py"]
-    licence = "SAM License"                         # of the weights, told by doctor
+    licence = "SAM License"                         # of the weights, shown by doctor
     licence_kind = "gated"                          # or "non-commercial"; "permissive" if not said
     page = "https://github.com/..."                 # where to read it
     timeout = 900                                   # s

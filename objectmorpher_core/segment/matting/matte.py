@@ -240,7 +240,7 @@ RUNS_THROUGH = 0.05  # of an edge is at least this much in the lowest quarter, a
 COARSE = 96  # px, at most: size at which a veil's colour is found
 WIDE = 0.25  # x the crop's size: over so much of the veil its colour is averaged
 PIECE = 30_000  # px that OpenCV samples at a time
-FAINT = 0.05  # coverage below which the veil's colour cannot be told
+FAINT = 0.05  # coverage below which the veil's colour is unknown
 
 
 def veil(coverage: U8) -> Mask:

@@ -28,7 +28,7 @@ SPREADS = 1.5, 6.0, 24.0  # x band: colours are gathered in the nearest of these
 LEAST_SHARE = 0.02  # of a window, below which its colour is not known
 GRAIN = 0.5  # standard deviations of the object's colours, which are no spill
 LIKENESS = 0.25, 0.5  # x the way to the background's colour: no spill below, nothing else above
-ALIKE = 0.06  # sRGB: colours so near each other cannot be told apart
+ALIKE = 0.06  # sRGB: colours so near each other cannot be distinguished
 
 
 @dataclass(frozen=True, eq=False)

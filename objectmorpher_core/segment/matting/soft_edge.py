@@ -28,7 +28,7 @@ BESIDE = 1e-3  # weight of the mask within ASTRAY of its edge
 FAR = 0.3  # and at the band's end
 CLEAR = 20.0  # variances that colours are apart: then the mask counts half as much
 WINDOW = 3.0  # px, deviation of the window they are gathered in, at the size that takes
-LEAST_SPREAD = 1e-4  # a variance of sRGB: a hundredth is never told apart
+LEAST_SPREAD = 1e-4  # a variance of sRGB: a hundredth is never distinguished
 RIDGE = 1.75  # px: half-width from which on the middle of a limb is certain
 TAIL = 0.02  # alpha that is as good as none
 POLISHED = 12.0  # px of band up to which the larger picture is solved for once more
@@ -130,8 +130,8 @@ def _whole_band(size: _Size, reach: float, before: F32 | None) -> F32:
 def _clearness(rgb: F32, distance: F32, reach: float) -> F32:
     """(h, w) how far apart the colours of object and background are nearby.
 
-    In their variances, along the line between their means. Hair before a plain sky is told from
-    it whatever the mask says; before a shelf it is not.
+    In their variances, along the line between their means. Hair differs from a plain sky,
+    whatever the mask says; from a shelf it does not.
     """
     height, width = distance.shape
     scale = min(WINDOW / reach, 1.0)

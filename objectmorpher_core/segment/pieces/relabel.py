@@ -75,7 +75,7 @@ def votes(pieces: Pieces, mask: Mask, doubted: int | None = None) -> F64:
 
 
 def _heard(pieces: Pieces, mask: Mask, doubted: int | None) -> F64:
-    """(n,) how much each piece's vote counts: what is like one that was told apart says little."""
+    """(n,) how much each piece's vote counts: what is like one that was set apart says little."""
     heard = np.ones(pieces.count)
     if doubted is not None:
         color = np.square(pieces.colors - pieces.colors[doubted]).sum(1) / DOUBT_COLOR**2

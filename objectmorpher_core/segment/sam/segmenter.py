@@ -182,7 +182,7 @@ class Sam:
     def _closer(
         self, rgb: RGB, view: SamView, prompt: Prompt, answer: SamAnswer, progress: Progress
     ) -> tuple[Mask, float]:
-        """(H, W) the answer, told better where the thing is small, and how sure it is."""
+        """(H, W) the answer, refined where the thing is small, and how sure it is."""
         mask = view.mask(rgb, answer)
         box = _box_of(mask)
         longer = max(rgb.shape[:2])

@@ -33,7 +33,7 @@ class Asked:
     points: F64  # (n, 2)
     is_object: Mask  # (n,) else it is what is not the object
     box: F64 | None = None  # (4,) x0, y0, x1, y1
-    logits: F32 | None = None  # (low, low) the answer before this, to be told better
+    logits: F32 | None = None  # (low, low) the answer before this, to be refined
 
 
 @dataclass(frozen=True, eq=False)

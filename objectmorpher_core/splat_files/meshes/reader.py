@@ -82,7 +82,7 @@ def _scene(data: bytes, ending: str, folder: MeshFolder) -> Any:
 
     resolver: Any = folder  # trimesh asks by name alone, whatever its type hints say
     # Its loaders raise whatever a damaged file leads them to, RecursionError and zlib's errors
-    # among them: the user is told one sentence.
+    # among them: the user reads one sentence.
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")

@@ -60,7 +60,7 @@ class Choices:
     metrics: tuple[str, ...] = ()  # names of METRICS; none: USUAL
     weights: Path | None = None  # folder with the official networks' files
     subsets: Subsets = field(default_factory=Subsets)
-    is_lenient: bool = False  # those of `metrics` that cannot be taken are told as lacking
+    is_lenient: bool = False  # those of `metrics` that cannot be taken are reported as lacking
 
 
 class _Networks:

@@ -32,7 +32,7 @@ SAME_PLACE = 5.0  # points: a click this near to the last one asks for more or l
 class Selection:
     """The current object's mask and the prompt that led to it.
 
-    A selection that a prompt made is told better by each further click; what was changed of it by
+    A selection that a prompt made is refined by each further click; what was changed of it by
     hand meanwhile stays, see `edits.answer_prompt`. One that was made by hand alone (a line, a
     brush, a file) has no prompt: there a click adds the object that it is on, or takes it away.
     """

@@ -51,7 +51,7 @@ def draw_method(editor: Editor, stage: str) -> None:
 
 
 def _label(editor: Editor, stage: str, name: str) -> str:
-    """A backend's name for people; "auto" also tells who that is, once it is known."""
+    """A backend's name for people; "auto" also names the one it stands for, once it is known."""
     if name != AUTO:
         return _named(name)
     taken = editor.methods.taken(stage)

@@ -455,7 +455,7 @@ def _is_answered(editor: Editor) -> bool:
 
 @contextmanager
 def _guarded(editor: Editor) -> Iterator[None]:
-    """A stroke that fails is taken back, and the user is told."""
+    """A stroke that fails is taken back, and a message says so."""
     try:
         yield
     except Exception as error:

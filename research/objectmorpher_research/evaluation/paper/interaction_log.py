@@ -50,7 +50,7 @@ class Recorded:
     """A log's record of one edit."""
 
     latencies: tuple[float, ...]  # s, of each input until it is answered; inf: never
-    computing: float | None  # s; None: it is not told
+    computing: float | None  # s; None: it is unknown
 
     @property
     def latency(self) -> float | None:

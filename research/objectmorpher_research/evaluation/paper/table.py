@@ -110,7 +110,7 @@ def measure_paper(
 
 
 def _recorded(result: MethodResult) -> Recorded:
-    """What the log tells; how our window answered wins over a drag that was made again."""
+    """What the log says; how our window answered wins over a drag that was made again."""
     found = Recorded((), None) if result.log is None else read_recorded(result.log)
     if result.frames is None:
         return found

@@ -95,7 +95,7 @@ def words_of(script: EditScript) -> str:
 
 
 def _middle(script: EditScript) -> XY | None:
-    """Where the object is, as far as the script tells; px."""
+    """Where the object is, as far as the script says; px."""
     if script.mask is not None:
         try:
             ys, xs = np.nonzero(read_picture(Path(script.mask).read_bytes()).pixels[..., 0])

@@ -54,7 +54,7 @@ class TruthCase:
     plate: RGB | None  # (H, W, 3) what is behind the thing; None: nobody knows
     shown: F64  # (H, W) the thing's true coverage after the edit
     region: F64  # (H, W) 1 where the edit changes something, or near it
-    has_outside: bool = True  # whether the truth tells what is outside the region
+    has_outside: bool = True  # whether the truth says what is outside the region
 
 
 @dataclass(frozen=True)

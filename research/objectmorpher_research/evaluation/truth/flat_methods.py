@@ -46,7 +46,7 @@ def warp(case: TruthCase, matte: Matte, plate: RGB) -> EditOutcome:
     """The cut-out warped so that its points are where they must be, as rigidly as it can be."""
     guidance, grid = case.guidance, _grid(case, matte)
     start = fitted_similarity(guidance)
-    size = start.scale if guidance.rigid is not None else 1.0  # what is told of the whole thing
+    size = start.scale if guidance.rigid is not None else 1.0  # what is given of the whole thing
     moved = _arap(grid, guidance, start.at(grid.points), size)
     reached = grid.weights(guidance.at) @ moved
     sheet = TexturedMesh(grid.points, grid.faces)

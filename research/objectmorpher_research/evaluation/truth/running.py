@@ -47,7 +47,7 @@ class CaseRow:
     seconds: float  # beyond what all methods share: the lift and the plate
     cpu: float  # of all cores together
     shared: float  # seconds of the default lift and the plate
-    memory: float  # MiB, the most that the process held; nan where that is not told
+    memory: float  # MiB, the most that the process held; nan where that is unknown
 
 
 @dataclass(frozen=True)
@@ -244,7 +244,7 @@ def _forget_peak() -> None:
 
 
 def _peak() -> float:
-    """MiB that this process held at most since then; nan where nobody tells."""
+    """MiB that this process held at most since then; nan where that is unknown."""
     if os.name != "posix":
         return float("nan")
     try:

@@ -16,7 +16,7 @@ from .rasterise import SAMPLES, Hits, interpolated, pixel_means, rasterise
 from .solids import TruthSolid, make
 
 WIDTH, HEIGHT = 480, 400  # px
-FIELDS = (38.0, 50.0, 62.0)  # degrees of view, told to every method as EXIF tells it
+FIELDS = (38.0, 50.0, 62.0)  # degrees of view, given to every method as EXIF gives it
 GLOSS = 24.0  # exponent of the highlight
 VISIBLE = 0.012  # solids, between a point and the nearest surface: it is seen
 

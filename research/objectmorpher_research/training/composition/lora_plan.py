@@ -24,7 +24,7 @@ class LoraPlan:
     rank: int = 16
     rate: float = 1e-4  # of A; AdamW's
     ratio: float = 3.0  # LoRA+: of B's rate to A's
-    decay: float = 0.01  # AdamW's own; not told
+    decay: float = 0.01  # AdamW's own; the paper names none
     batch: int = 4  # triplets of a step, on all processes together; not told
     warm_up: int = 0  # steps in which the rates rise; not told
     steepest: float = 1.0  # length of a gradient that is not shortened; not told

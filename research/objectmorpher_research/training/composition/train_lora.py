@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from torch import Tensor, nn
 
 CHECK = 1 << 40  # the first number of the draws for what is held out
-SAMPLER = 50  # steps for which the scheduler's shift is told
+SAMPLER = 50  # steps for which the scheduler's shift is computed
 
 
 @dataclass(frozen=True)

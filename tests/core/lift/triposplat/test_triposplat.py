@@ -49,8 +49,8 @@ def generator(folder):
 def test_keys_and_shapes_are_the_published_ones(kind):
     with torch.device("meta"):
         network = kind(networks.FORM)
-    told = sorted(f"{key} {tuple(t.shape)}" for key, t in network.state_dict().items())
-    assert hashlib.sha256("\n".join(told).encode()).hexdigest() == PUBLISHED[kind]
+    condition = sorted(f"{key} {tuple(t.shape)}" for key, t in network.state_dict().items())
+    assert hashlib.sha256("\n".join(condition).encode()).hexdigest() == PUBLISHED[kind]
 
 
 def test_what_they_say_is_what_the_published_code_says():
@@ -98,10 +98,10 @@ def test_as_many_gaussians_as_are_asked_for_and_the_same_for_a_seed(generator, p
 
 
 def test_each_step_is_told_and_can_be_the_last(generator, picture):  # noqa: F811
-    told = []
-    generator.make(picture, 64, lambda fraction, note: told.append((fraction, note)))
-    assert [f for f, _ in told] == sorted(f for f, _ in told)
-    assert sum("step" in note for _, note in told) == SAMPLING.steps
+    condition = []
+    generator.make(picture, 64, lambda fraction, note: condition.append((fraction, note)))
+    assert [f for f, _ in condition] == sorted(f for f, _ in condition)
+    assert sum("step" in note for _, note in condition) == SAMPLING.steps
 
     def stop(fraction: float, note: str) -> None:
         if "step 3 " in note:
