@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,13 +12,30 @@ import numpy as np
 import pytest
 from PIL import ImageCms
 
+from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.settings import AS_THEY_ARE, AUTO, Settings
 from objectmorpher.system.desktop import read_profile, system_profile
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.pictures.screen_colours import GRID
 
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 REPLACE, BYTES = 0, 8
+
+
+def dull(profile: bytes, share: float = 0.5) -> bytes:
+    """A profile with the same white, each of whose primaries is nearer to grey."""
+    count = struct.unpack_from(">I", profile, 128)[0]
+    entries = (struct.unpack_from(">4sII", profile, 132 + 12 * k) for k in range(count))
+    at = {name: offset + 8 for name, offset, _ in entries}
+    columns = [at[name] for name in (b"rXYZ", b"gXYZ", b"bXYZ")]
+    colours = np.array([struct.unpack_from(">3i", profile, place) for place in columns])
+    mixed = np.rint((1 - share) * colours + share * colours.mean(0)).astype(int)
+    changed = bytearray(profile)
+    for place, colour in zip(columns, mixed.tolist(), strict=True):
+        struct.pack_into(">3i", changed, place, *colour)
+    return bytes(changed)
 
 
 def test_x11_tells_it(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,3 +88,33 @@ def test_a_file_can_be_chosen_and_what_is_none_is_one_sentence(
     good.unlink()
     assert read_profile(good) is None
     editor.settings = replace(editor.settings, screen_profile=AUTO)
+
+
+def test_a_proof_shows_what_another_device_can_show(
+    editor: Editor, ball: Document, tmp_path: Path
+) -> None:
+    editor.settings = replace(Settings(), screen_profile=AS_THEY_ARE)
+    editor.start(ball)
+    run(editor, "proof")  # by which profile is asked first
+    assert editor.filing.wanted is Dialog.PROOF_OPEN and not editor.view.is_proof
+    printer, bad = tmp_path / "printer.icc", tmp_path / "bad.icc"
+    printer.write_bytes(dull(PROFILE))
+    bad.write_bytes(b"nonsense")
+    editor.looking.proof_by(bad)
+    assert editor.message is not None and "no colour profile" in editor.message.text
+    assert editor.looking.screen_table() is None
+    document = editor.committed
+    editor.looking.proof_by(printer)
+    table = editor.looking.screen_table()
+    assert table is not None and "printer" in editor.looking.badge
+    red = table[0, 0, -1].astype(int)  # outside of what it can show
+    assert red[0] > 150 and red[1:].min() > 60
+    greys = table[np.arange(GRID), np.arange(GRID), np.arange(GRID)].astype(int)
+    assert np.abs(greys - np.linspace(0, 255, GRID).astype(int)[:, None]).max() <= 3
+    assert editor.committed is document
+    run(editor, "proof")
+    assert editor.looking.screen_table() is None and editor.looking.badge == ""
+    editor.settings = replace(editor.settings, proof_profile=str(tmp_path / "gone.icc"))
+    run(editor, "proof")
+    assert editor.message is not None and "not there any more" in editor.message.text
+    assert not editor.view.is_proof

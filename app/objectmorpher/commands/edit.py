@@ -148,6 +148,13 @@ def _points(editor: Editor) -> None:
     editor.view.has_points = not editor.view.has_points
 
 
+def _proof(editor: Editor) -> None:
+    if editor.settings.proof_profile:
+        editor.looking.toggle_proof()
+    else:
+        editor.filing.wanted = Dialog.PROOF_OPEN
+
+
 def _panel(editor: Editor) -> None:
     editor.view.wants_panel = not editor.view.has_panel
 
@@ -172,6 +179,8 @@ LOOK_COMMANDS: dict[str, Command] = {
     "split": Command(
         "Split before/after", "\\", _split, is_on=lambda e: e.view.split is not None
     ),
+    "proof": Command("Proof colours", "Ctrl+Shift+Y", _proof, is_on=lambda e: e.view.is_proof),
+    "proof_profile": Command("Proof profile…", "", asks_for(Dialog.PROOF_OPEN)),
     "points": Command(
         "Control graph", "Ctrl+Shift+P", _points, no_lift, lambda e: e.view.has_points
     ),

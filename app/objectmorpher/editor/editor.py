@@ -97,6 +97,7 @@ class Editor(EditorState):
             Dialog.MODEL_OPEN: self.models.add,
             Dialog.MODEL_FOLDER: self.models.hub.use_folder,
             Dialog.PROFILE_OPEN: self.looking.use_profile,
+            Dialog.PROOF_OPEN: self.looking.proof_by,
         }
 
     def _in_order(self) -> tuple[Callable[[], bool], ...]:

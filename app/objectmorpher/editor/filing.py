@@ -48,6 +48,7 @@ class Dialog(Enum):
     MODEL_OPEN = "Use depth model"
     MODEL_FOLDER = "Use the model in a folder"
     PROFILE_OPEN = "Use colour profile"
+    PROOF_OPEN = "Proof by colour profile"
 
     @property
     def is_opening(self) -> bool:

@@ -57,6 +57,7 @@ class Settings:
     dialogs: str = AUTO  # file dialogs: "auto" (the system's where there are any) or "built-in"
     motion: str = AUTO  # "auto" (as the system has it), "full" or "reduced"
     screen_profile: str = AUTO  # "auto" (the system's), "off", or the path of an ICC file
+    proof_profile: str = ""  # path of an ICC file, by which colours are proofed
     quality: int = 95  # of JPEG exports
     webp_quality: int = 100  # of WebP exports; 100 is lossless
     export_what: str = "Photo"  # the last export's, see `export_plan.py`

@@ -173,6 +173,7 @@ class ViewState:
     is_fitted: bool = True  # follows the canvas's size until the user zooms
     tool: ToolName = ToolName.SELECT
     is_before: bool = False  # X is held: the photo as it was
+    is_proof: bool = False  # colours as a printer or another screen has them
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
     has_history: bool = False  # the list of steps is shown

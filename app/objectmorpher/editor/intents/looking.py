@@ -34,7 +34,7 @@ class LookingIntents:
         self._landing = landing
         # of the last orbit: what is derived from a document is remembered by identity
         self._made: tuple[Document, int, Orbit, Document] | None = None
-        self._screens, self._tables = Memo(), Memo()
+        self._screens, self._proofs, self._tables = Memo(), Memo(), Memo()
 
     @property
     def orbit(self) -> Orbit | None:
@@ -73,20 +73,54 @@ class LookingIntents:
         """Return the photo's colours on this screen, see `screen_colours`; None: as they are."""
         from objectmorpher_core.pictures.screen_colours import screen_table
 
-        document = self._editor.document
-        if document is None or self._editor.settings.screen_profile == AS_THEY_ARE:
+        document, proof = self._editor.document, self.proof_profile()
+        if document is None:
+            return None
+        if proof is None and self._editor.settings.screen_profile == AS_THEY_ARE:
             return None
         photo, screen = document.photo.picture.icc, self.screen_profile()
-        return self._tables(lambda: screen_table(photo, screen), photo, screen)
+        return self._tables(lambda: screen_table(photo, screen, proof), photo, screen, proof)
 
-    def use_profile(self, path: Path) -> None:
-        """From now on the screen has the profile of a file."""
+    def proof_profile(self) -> bytes | None:
+        """Return the ICC profile by which colours are proofed now; None: they are not."""
+        from ...system.desktop import read_profile
+
+        chosen = self._editor.settings.proof_profile
+        if not chosen or not self._editor.view.is_proof:
+            return None
+        return self._proofs(lambda: read_profile(Path(chosen)), chosen)
+
+    def toggle_proof(self) -> None:
+        """Shows the colours of the export on a printer or another screen, or as they are again."""
+        editor = self._editor
+        editor.view.is_proof = not editor.view.is_proof
+        if editor.view.is_proof and self.proof_profile() is None:
+            editor.view.is_proof = False
+            name = Path(editor.settings.proof_profile).name
+            editor.complain(t("{name} is not there any more: choose another profile", name=name))
+
+    def proof_by(self, path: Path) -> None:
+        """From now on colours are proofed by the profile of a file, which is shown at once."""
+        editor, name = self._editor, self._named(path, is_proof=True)
+        if name is None:
+            editor.complain(t("{name} is no colour profile", name=path.name))
+            return
+        editor.settings = replace(editor.settings, proof_profile=str(path.absolute()))
+        editor.view.is_proof = True
+        editor.say(t("Colours are shown as by {name}", name=name))
+
+    def _named(self, path: Path, is_proof: bool = False) -> str | None:
+        """A profile's own name; None where the file is none."""
         from objectmorpher_core.pictures.screen_colours import profile_name
 
         from ...system.desktop import read_profile
 
-        editor, profile = self._editor, read_profile(path)
-        name = None if profile is None else profile_name(profile)
+        profile = read_profile(path)
+        return None if profile is None else profile_name(profile, is_proof)
+
+    def use_profile(self, path: Path) -> None:
+        """From now on the screen has the profile of a file."""
+        editor, name = self._editor, self._named(path)
         if name is None:
             editor.complain(t("{name} is no colour profile of a screen", name=path.name))
             return
@@ -104,6 +138,9 @@ class LookingIntents:
             return ""
         if editor.view.is_before:
             return t("The photo as it was")
+        if self.proof_profile() is not None:
+            name = Path(editor.settings.proof_profile).stem
+            return t("Proof · colours of {name}", name=name)
         if editor.view.tool in OF_THE_PHOTO and self._landing.is_edit_shown:
             return t("Your edit · Hold X to see the photo")
         return ""

@@ -36,6 +36,7 @@ FILTERS = {
     Dialog.MODEL_OPEN: (MODEL_ENDING,),
     Dialog.MODEL_FOLDER: GIVEN,
     Dialog.PROFILE_OPEN: (".icc", ".icm"),
+    Dialog.PROOF_OPEN: (".icc", ".icm"),
 }
 
 

@@ -35,7 +35,7 @@ VERBS = {
     Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
     Dialog.MASK_OPEN: "Import", Dialog.SHAPE_OPEN: "Use", Dialog.MASK_SAVE: "Export",
     Dialog.MODEL_OPEN: "Use", Dialog.MODEL_FOLDER: "Use",
-    Dialog.PROFILE_OPEN: "Use", Dialog.VIEW_OPEN: "Add",
+    Dialog.PROFILE_OPEN: "Use", Dialog.PROOF_OPEN: "Use", Dialog.VIEW_OPEN: "Add",
 }  # fmt: skip
 
 

@@ -88,7 +88,8 @@ MENUS: dict[str, tuple[str, ...]] = {
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),
     "View": (
         "zoom_in", "zoom_out", "fit", "actual", "double", "pixels", "-",
-        *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
+        *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points", "-",
+        "proof", "proof_profile",
     ),
     "Window": (
         "next_tab", "previous_tab", "-", "panel", "history", "snapshot", "models", "preferences",
