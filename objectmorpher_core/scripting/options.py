@@ -436,14 +436,17 @@ def options_of(*parts: str) -> frozenset[str]:
     return frozenset(name for name, option in OPTIONS.items() if option.part in parts)
 
 
-def script_from(options: Mapping[str, Any]) -> EditScript:
-    """A script from long option names without dashes. Raises ScriptError."""
+def script_from(options: Mapping[str, Any], dashes: str = "") -> EditScript:
+    """A script from long option names without dashes. Raises ScriptError.
+
+    `dashes` come before the names in errors, as on the command line.
+    """
     said: dict[str, Any] = {}
     for key, value in options.items():
         name = key.replace("-", "_")
         if name not in OPTIONS:
             raise ScriptError(f"there is no option {shown(key)}{meant(name, OPTIONS)}")
-        said[name] = OPTIONS[name].values.read(key, value)
+        said[name] = OPTIONS[name].values.read(dashes + key, value)
     return EditScript(**said)
 
 

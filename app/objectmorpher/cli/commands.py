@@ -348,7 +348,8 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
 
 
 def _script(options: argparse.Namespace) -> EditScript:
-    return script_from(_said(options))
+    said = _said(options)
+    return script_from({name.replace("_", "-"): value for name, value in said.items()}, "--")
 
 
 def _said(options: argparse.Namespace) -> dict[str, Any]:
