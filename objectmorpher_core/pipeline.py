@@ -180,7 +180,7 @@ class Edited:
         return self.puppets[self.first]
 
     def report(self) -> dict[str, Any]:
-        """The figures of DESIGN section 6, up to now."""
+        """The figures that `--report` writes, up to now."""
         report = build_report(
             self.document, self.puppets, self.energies, self.composite, self.stopwatch
         )

@@ -37,7 +37,7 @@ Each whole 1 of that load is a core that somebody else was using; the figures ar
 
 ## Budgets
 
-Two ordinary cores without a GPU are what the design asks for. A frame of the tables below begins at
+The budgets are for two ordinary cores without a GPU. A frame of the tables below begins at
 the posed control points; *drag to pixels* adds the median solve. Medians; in brackets the least of
 all frames, which is nearer to what the program itself needs where the machine had other work.
 

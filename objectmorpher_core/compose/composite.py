@@ -1,4 +1,4 @@
-"""Plate and object back into the photo, touching nothing else (DESIGN section 5).
+"""Plate and object back into the photo, touching nothing else.
 
 Everything is computed at the photo's own resolution on a crop around the edit, and blended into
 the photo inside the footprint only. A pixel of the object that did not move is the photo's own.

@@ -69,7 +69,7 @@ def build_graph(
     the geodesics; points within 0.3 diameters along the surface are linked, or within six
     spacings where that is nearer: a longer link would weigh nothing. `settings.links` "euclidean"
     is the ablation that links by straight distance. Weights are exp(-g^2 / 2 s^2), and symmetric,
-    so that the Laplacian is too (DESIGN section 4). s is twice the mean spacing: the object
+    so that the Laplacian is too. s is twice the mean spacing: the object
     behaves like a continuous body, and a dragged point takes its surroundings along. With
     `settings.is_faithful` it is the mean length of a link, some five spacings: then every point
     is tied to so many far ones that a dragged one leaves its neighbours behind, and makes a spike.

@@ -1,4 +1,4 @@
-"""Which near control points have a gap between them (DESIGN section 4).
+"""Which near control points have a gap between them.
 
 The paper's auxiliary graph joins whatever is near. Between two control points on either side of a
 gap the way along the object's surface is long, so it is measured: on the graph of the Gaussians,

@@ -1,4 +1,4 @@
-"""The place of an object's centre, and the placement that takes it to another (DESIGN section 6).
+"""The place of an object's centre, and the placement that takes it to another.
 
 A placement turns and scales an object about its centre, and puts the centre somewhere. As long as
 turn and scale stay, every point of the object keeps its offset from the centre.

@@ -5,7 +5,7 @@
    weight; `rules.SPLATTINGS` says what differs between kinds of assets: the screen
    filter, the tail, the least and most alpha.
 2. From the same covariances follows the affine map that says which point of the photo it shows
-   at a pixel: u0 + A d, A = J0 Sigma F^T J1^T (J1 F Sigma F^T J1^T)^-1 (DESIGN section 3).
+   at a pixel: u0 + A d, A = J0 Sigma F^T J1^T (J1 F Sigma F^T J1^T)^-1.
 3. Gaussians that show nothing of the photo, and are no surface, are composited one by one, front
    to back by the depth of their means, premultiplied: 3D Gaussian splatting.
 4. All others are put together in layers, pixel by pixel (surface splatting, Zwicker et al. 2001).

@@ -1,4 +1,4 @@
-"""The figures of one edit (DESIGN section 6)."""
+"""The figures of one edit."""
 
 from __future__ import annotations
 

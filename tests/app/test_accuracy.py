@@ -22,7 +22,7 @@ OBJECTS = {"astronaut": (224, 150), "coffee": (300, 215), "chelsea": (200, 150)}
 ZOOMS = (0.6, 1.7, 6.0)  # canvas px per px of the photo
 POINTS = 20
 FARTHEST = 90.0  # canvas px that a point is dragged
-PIXEL = 1.0  # canvas px (DESIGN section 1, promise 3)
+PIXEL = 1.0  # canvas px
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The command line: the contract of DESIGN section 6, and one sentence for every failure."""
+"""The command line: what it promises, and one sentence for every failure."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session
 from strokes import move, press, release, stroke
 
-PIXEL = 1.0  # canvas px, DESIGN promise 3: a handle ends within one of its target
+PIXEL = 1.0  # canvas px: a handle ends within one of its target
 
 
 def canvas_xy(editor: Editor, x: float, y: float) -> np.ndarray:

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.usefixtures("lifted_once")
 MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)
 PHOTO, MASK_PNG = shapes.png(PIXELS), shapes.mask_png(MASK)
-HANDLE_PX = 1.0  # promise 3 of the design
+HANDLE_PX = 1.0  # that a handle may end off its target
 QUICK = {"gaussians": 300, "inpaint": "telea"}
 
 

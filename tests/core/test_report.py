@@ -1,4 +1,4 @@
-"""R.json: its keys are a contract (DESIGN section 6), its figures add up."""
+"""R.json: its keys are a contract, its figures add up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Results remembered by the identity of what they came from (ARCHITECTURE 1)."""
+"""Results remembered by the identity of what they came from."""
 
 from __future__ import annotations
 

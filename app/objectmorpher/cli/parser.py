@@ -1,4 +1,4 @@
-"""The command line (DESIGN section 6): subcommands, progress bars, exit codes.
+"""The command line: subcommands, progress bars, exit codes.
 
 A failure is one sentence on stderr and a non-zero exit; nothing is then written.
 """

@@ -282,7 +282,7 @@ def _ball(editor: Editor, first: Pointer) -> Change:
 
 
 def _turn(editor: Editor, first: Pointer) -> Change:
-    """What faces the camera follows the pointer: to the right is a negative yaw (DESIGN 6)."""
+    """What faces the camera follows the pointer: to the right is a negative yaw."""
     start, (yaw, pitch, roll) = editor.placing.placement, editor.placing.angles
     assert start is not None
 

@@ -1,7 +1,7 @@
 """The shadow that an object throws in the photo, taken off the ground.
 
 Where it falls the ground is divided by the light that is missing there: the photo's own texture
-stays (promise 2). Only what is too dark to show any is invented.
+stays. Only what is too dark to show any is invented.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ hole in a picture, and is filled with patches from beside it, or mirrored ones, 
 edges, as a background is (`compose.plate`). They are taken from about as far along the axis of the
 turn, and where about the colours are that the side is to have: hair goes on as hair. Each Gaussian
 that the photo does not show, or shows from nearly edge on, carries its piece of the picture that
-faces it most, by the same map that carries the photo (DESIGN section 3): it is as sharp, and stays
+faces it most, by the same map that carries the photo: it is as sharp, and stays
 the same however the object turns.
 """
 

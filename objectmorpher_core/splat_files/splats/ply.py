@@ -33,7 +33,7 @@ from ..limits import GREATEST, LEAST_SCALE, SplatFileError, check_count, empty_c
 
 # Ways in which files have their axes, and the turns that bring them to ours.
 #
-# Ours are a camera's: x right, y down, z away from the viewer (DESIGN section 2).
+# Ours are a camera's: x right, y down, z away from the viewer.
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: y up and z back, as in glTF and .spz
 QUARTER_TURN = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # z up and y away: .stl

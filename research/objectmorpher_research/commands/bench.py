@@ -30,7 +30,7 @@ def run_bench(options: argparse.Namespace) -> None:
 
 
 def figures(what: str, is_quick: bool) -> dict[str, Any]:
-    """The figures of one benchmark (DESIGN section 6), ready for JSON."""
+    """The figures of one benchmark, ready for JSON."""
     from ..bench.timing import cpu_name
 
     gl_renderer = None

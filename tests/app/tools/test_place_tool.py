@@ -188,7 +188,7 @@ def test_dragging_beside_the_object_to_the_right_turns_its_front_to_the_right(
     placed: Editor,
 ) -> None:
     yaw, pitch, roll = stroke(placed, np.array([8.0, 8.0]), np.array([58.0, 8.0])).turn
-    assert yaw < START.turn[0]  # DESIGN section 6: positive yaw turns the front to the left
+    assert yaw < START.turn[0]  # positive yaw turns the front to the left
     assert (pitch, roll) == START.turn[1:]
 
 

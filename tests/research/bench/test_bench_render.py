@@ -20,7 +20,7 @@ from objectmorpher_research.bench.render import tiles_frame
 from objectmorpher_research.bench.scenes import BenchScene, cloud_scene, lift_scene
 from objectmorpher_research.bench.timing import seconds
 
-CONTRACT = {"renderer", "gaussians", "width", "height", "sort_ms", "frame_ms"}  # DESIGN section 6
+CONTRACT = {"renderer", "gaussians", "width", "height", "sort_ms", "frame_ms"}
 ALWAYS = CONTRACT | {"scene", "frame_least_ms", "first_frame_ms", "solve_ms"}
 PARTS = {"project_ms", "bin_ms", "draw_ms"}
 PEERS = {"gl", "classic-gl", "gsplat-torch"}  # each where it runs
