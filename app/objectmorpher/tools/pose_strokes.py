@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 DEPTH_STEP = 0.03  # object diameters per notch of the wheel
 STEADY = 5.0  # points around a handle within which the pointer has no direction
+BACK = 1.0  # degrees, by which a turn that ends where it began may be off
 SIGHT = np.array([0.0, 0.0, 1.0])  # world, into the picture
 
 
@@ -36,9 +37,10 @@ def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
     """The selected handles follow the pointer, each at its own depth, which the wheel changes.
 
     Shift keeps one axis of the picture, Alt moves along the surface's normal. A press that does
-    not move is a click: it chooses a handle that was there, or sets a new one.
+    not move, or ends where it began, is a click: it chooses a handle that was there, or sets a new
+    one. Solved for again, the pose would be another one where little holds the object.
     """
-    posing = editor.posing
+    posing, began = editor.posing, editor.preview
     before = posing.selected
     chosen = _chosen(before, handle, start.shift)
     posing.select(*chosen)
@@ -55,6 +57,8 @@ def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
             posing.let_go(chosen)
         if is_moved:
             _follow(editor, held, start, pointer, depth)
+    if depth == 0 and (pointer.xy == start.xy).all():
+        editor.preview, is_moved = began, False
     if is_moved:
         count = len(chosen)
         posing.finish(t("Drag {count} points", count=count) if count > 1 else t("Drag point"))
@@ -91,9 +95,10 @@ def _follow(editor: Editor, held: HeldHandles, start: Pointer, now: Pointer, dep
 def turn(editor: Editor, start: Pointer, handle: int, is_ring: bool) -> Stroke:
     """The handle turns with the pointer's angle around it.
 
-    On the ring Shift turns in steps; elsewhere Shift turns out of the picture's plane.
+    On the ring Shift turns in steps; elsewhere Shift turns out of the picture's plane. What ends
+    where it began, and has not gone round, has not turned.
     """
-    posing = editor.posing
+    posing, began = editor.posing, editor.preview
     if handle not in posing.selected:
         posing.select(handle)
     assert editor.document is not None
@@ -117,6 +122,8 @@ def turn(editor: Editor, start: Pointer, handle: int, is_ring: bool) -> Stroke:
                 angle = round(angle / SNAP) * SNAP
             posing.readout = f"{angle:.0f}°"
             posing.turn(handle, first, np.radians(angle - roll) * SIGHT)
+        if (pointer.xy == start.xy).all() and abs(swept) < BACK:
+            editor.preview, is_moved = began, False
         if is_moved:
             posing.finish(t("Turn point"))
         else:

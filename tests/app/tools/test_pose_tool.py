@@ -292,6 +292,23 @@ def test_nothing_moves_but_what_is_dragged(posed: Editor) -> None:
             posed.escape()
 
 
+def test_a_drag_or_a_turn_that_comes_back_is_none(posed: Editor) -> None:
+    """Solved for again, an object that only its handle holds would be turned otherwise."""
+    x, y = CENTRE
+    posed.posing.set_stays(Stays.NOTHING)
+    stroke(posed, at(posed, x - 20, y), at(posed, x + 30, y - 25))
+    place, before = posed.view.canvas_from_image(posed.posing.positions()[0]), posed.committed
+    stroke(posed, place, place + 40, place + (60, -30), place)
+    assert posed.committed is before and posed.posing.selected == (0,)
+    stroke(posed, place, place + (60, -30), place + (9, 60), place + (60, -30), place, ctrl=True)
+    assert posed.committed is before
+    old = _shown(posed)
+    new = at(posed, x + 50, y - 10)
+    stroke(posed, new, new + 30, new)  # a new one is there, and has moved nothing
+    assert posed.object is not None and len(posed.object.handles) == 2
+    np.testing.assert_allclose(_shown(posed), old, atol=0.05)
+
+
 def test_p_pins_what_is_under_the_pointer_and_a_handle_that_is(posed: Editor) -> None:
     place = at(posed, 90, 60)
     TOOL.hover(posed, Pointer(*place))
