@@ -130,6 +130,7 @@ class Editor(EditorState):
         self.view.selecting.level = USUAL_LEVEL
         self.view.orbit = None
         self.view.fit(document.photo.size)
+        self.view.suit_brush(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()
         self.recovery.offer()

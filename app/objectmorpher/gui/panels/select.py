@@ -272,9 +272,9 @@ STEP = 0.2  # x the radius, of the - and + buttons
 
 
 def draw_radius(editor: Editor) -> None:
-    radius = editor.view.brush.radius
+    radius, usual = editor.view.brush.radius, editor.view.usual_radius
     step = max(STEP * radius, 0.5)  # a fifth of a large one is seen, and of a small one is left
-    number = Number(t("Radius"), "%.1f px", 0.25, step, 20.0, SMALLEST_BRUSH, LARGEST_BRUSH)
+    number = Number(t("Radius"), "%.1f px", 0.25, step, usual, SMALLEST_BRUSH, LARGEST_BRUSH)
     change = number_field(number, radius)
     if change.is_changed:
         editor.view.brush = replace(editor.view.brush, radius=change.value)
