@@ -91,7 +91,7 @@ class FileChooser:
         if self._dialog is Dialog.OPEN:  # of which there are twenty
             endings = t("A photo, a camera RAW file or a session")
         elif self._dialog is Dialog.SAVE:
-            endings = t("A session (.omorph) keeps the photo and every object with its pose")
+            endings = t("A session (.omorph) keeps photo, objects and poses")
         about = t("{endings}. Type a name or a whole path, or choose below.", endings=endings)
         with modal(t(self._dialog.value), WIDTH, about, HEIGHT) as is_shown:
             if is_shown:
