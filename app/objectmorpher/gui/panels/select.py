@@ -259,11 +259,14 @@ def _draw_facts(editor: Editor) -> None:
 
 def _draw_front(editor: Editor, item: EditObject) -> None:
     """Whether it is not edited and stays in front."""
-    if why_not(editor, "keep_in_front") is not None:
+    if item.is_moved:
         return
+    reason = why_not(editor, "keep_in_front")
+    imgui.begin_disabled(reason is not None)  # there all the same, or all below it would jump
     if checkbox(t("Keep in front"), item.stays_in_front) != item.stays_in_front:
         run(editor, "keep_in_front")
-    tooltip(t("It is not edited, and covers what moves behind it"))
+    imgui.end_disabled()
+    tooltip(reason or t("It is not edited, and covers what moves behind it"))
 
 
 # The brush's numbers, for every tool that paints.
