@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 import time
 import weakref
 from collections.abc import Iterator
@@ -18,6 +19,7 @@ from PIL import Image
 
 from editor_steps import CENTRE, close_all, open_file, wait_for_jobs, wait_until
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.opening import THUMB, read_thumbnail
 from objectmorpher.editor.recovery import Left
 from objectmorpher.editor.settings import Backends
@@ -268,3 +270,21 @@ def test_a_thumbnail_is_the_upright_photo_of_a_file_or_a_session(tmp_path: Path,
         (tmp_path / name).write_bytes(data)
         assert read_thumbnail(tmp_path / name) is None, name
     assert read_thumbnail(tmp_path / "gone.png") is None
+
+
+def test_files_are_first_looked_for_among_the_photos(
+    editor: Editor, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_PICTURES_DIR", str(photos))
+    open_file(editor, photo_path)
+    assert editor.filing.suggestion(Dialog.OPEN) == photo_path.parent
+    editor.tabs.add()
+    if sys.platform == "linux":
+        assert editor.filing.suggestion(Dialog.OPEN) == photos
+    photos.rmdir()
+    monkeypatch.setenv("XDG_PICTURES_DIR", str(photos))
+    assert editor.filing.suggestion(Dialog.OPEN) == Path.home()
+    close_all(editor)

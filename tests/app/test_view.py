@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import MARGIN, Shown, ViewState
+from objectmorpher.editor.view import MARGIN, Shown, ToolName, ViewState
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document
 
@@ -73,6 +75,38 @@ def test_a_zoomed_photo_keeps_its_zoom_when_the_window_grows(view: ViewState) ->
     view.resize((1400, 900), 1.0, PHOTO)
     assert view.zoom == 5.0
     np.testing.assert_allclose(view.image_from_canvas((700, 450)), middle)
+
+
+def test_a_brush_suits_the_photo_until_somebody_sizes_it(view: ViewState) -> None:
+    view.suit_brush((600, 400))
+    assert view.brush.radius == 20.0
+    view.suit_brush((4000, 3000))
+    large = view.brush.radius
+    assert 80 < large < 120
+    assert view.brush.hardness == ViewState().brush.hardness
+    view.suit_brush((2400, 1600))
+    assert 20 < view.brush.radius < large  # each photo has its own
+    view.brush = replace(view.brush, radius=33.0)
+    view.suit_brush((4000, 3000))
+    assert view.brush.radius == 33.0
+    assert view.usual_radius == large  # that is what a double-click on the name brings back
+
+
+def test_a_tool_forgets_what_was_said_of_the_last_one(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    editor.choose_tool(ToolName.POSE)
+    editor.say("It is in 3D now · Drag any point of it")
+    editor.choose_tool(ToolName.POSE)
+    assert editor.message is not None
+    editor.choose_tool(ToolName.PLACE)
+    assert editor.message is None
+    editor.complain("the disk is full")
+    editor.choose_tool(ToolName.LOOK)
+    assert editor.message is not None
+    editor.lock(0)
+    editor.say_locked(0)
+    editor.choose_tool(ToolName.COMPOSE)
+    assert editor.message is not None and editor.message.action is not None
 
 
 def test_views_have_keys_of_their_own_and_are_in_the_menu() -> None:

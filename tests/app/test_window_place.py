@@ -38,6 +38,8 @@ def test_turning_by_a_ring_and_going_back(
         hands.xdotool("mousemove", *middle)
         hands.press("4")
         hands.wait(lambda: hands.is_accent(PLACE_TOOL), "choosing the tool")
+        long, short = hands.area("From above"), hands.area("Yaw")
+        assert long[0] > short[0] and long[2] == short[2]  # the name does not run under its field
         hands.drag(tuple(ring[0]), tuple(ring[1]))
         hands.wait(lambda: hands.is_accent(PRIMARY), "turning")
         hands.wait(lambda: "edited" in hands.title(), "turning")

@@ -131,6 +131,7 @@ class Editor(EditorState):
         self.view.selecting.level = USUAL_LEVEL
         self.view.orbit = None
         self.view.fit(document.photo.size)
+        self.view.suit_brush(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()
         self.recovery.offer()
@@ -263,6 +264,9 @@ class Editor(EditorState):
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
             self.say(t("Lift an object first"))
             return
+        said = self.message
+        if tool is not self.view.tool and said and not said.is_error and said.action is None:
+            self.message = None  # what it says to do next is of the tool that is left
         self.view.tool = tool
         self.hover = Hover()
 

@@ -17,6 +17,7 @@ from ..system.texts import t
 from ..worker.requests import JobError
 from .export_plan import FORMATS
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, OpenedFile, is_object, read_document, read_photo
+from .settings import pictures_folder
 from .tasks import SELECT
 from .view import ToolName
 
@@ -242,7 +243,7 @@ class Filing:
         """The file name a dialog begins with."""
         editor = self._editor
         source = editor.source or editor.path
-        folder = source.parent if source else Path.home()
+        folder = source.parent if source else pictures_folder()
         if dialog.is_opening:
             return folder
         name = editor.document.photo.name if editor.document else "photo"

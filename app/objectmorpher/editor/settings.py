@@ -84,6 +84,12 @@ class Settings:
         return replace(self, recent=(name, *others)[:RECENT])
 
 
+def pictures_folder() -> Path:
+    """Where this desktop keeps its photos; the home folder where there is no such folder."""
+    folder = platformdirs.user_pictures_path()
+    return folder if folder.is_dir() else Path.home()
+
+
 def settings_path() -> Path:
     """The user's settings file; OBJECTMORPHER_SETTINGS names another one."""
     if named := os.environ.get("OBJECTMORPHER_SETTINGS"):

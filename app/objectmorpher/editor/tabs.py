@@ -135,6 +135,8 @@ class Tabs:
         editor.tab = tab
         editor.derived.adopt(shapes)
         tab.restore_view(editor.view)
+        if tab.document is not None:
+            editor.view.suit_brush(tab.document.photo.size)
         self._posing.select(*tab.selected)
         if not editor.is_lifted:
             self._tasks.read_photo()

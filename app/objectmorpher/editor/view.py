@@ -6,8 +6,9 @@ in framebuffer px. Image px: the photo's own.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,7 @@ class PoseView:
     has_influence: bool = False
 
 
+BRUSH_SHARE = 0.03  # of a photo's side, the radius of a brush: 20 px in one of 700 px
 MARGIN = 24.0  # points between the fitted photo and the canvas's edge
 MIN_ZOOM, MAX_ZOOM = 0.02, 64.0  # canvas px per image px
 PIXELS_FROM = 8.0  # canvas px per image px, from which on single pixels are looked at
@@ -185,6 +187,7 @@ class ViewState:
     orbit: Orbit | None = None  # of the Look tool; None: as the photo's camera sees it
     color: tuple[int, int, int] | None = None  # 8-bit sRGB shown under the pointer, if so near
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
+    usual_radius: float = Brush().radius  # px of the photo, of a brush that nobody has sized
     pose: PoseView = field(default_factory=PoseView)
     selecting: Selecting = field(default_factory=Selecting)
     compose: ComposeView = field(default_factory=ComposeView)
@@ -226,6 +229,13 @@ class ViewState:
         self.zoom = float(np.clip(min(across, down, 4 * self.scale), MIN_ZOOM, MAX_ZOOM))
         self._centre_on(np.array(photo) / 2)
         self.is_fitted = True
+
+    def suit_brush(self, photo: tuple[int, int]) -> None:
+        """A brush that nobody has sized is as large as suits a photo of `photo` px."""
+        usual = max(Brush().radius, float(round(BRUSH_SHARE * math.sqrt(photo[0] * photo[1]))))
+        if self.brush.radius == self.usual_radius:
+            self.brush = replace(self.brush, radius=usual)
+        self.usual_radius = usual
 
     def set_zoom(self, zoom: float, around: tuple[float, float], photo: tuple[int, int]) -> None:
         """Magnifies so that the image point under canvas px `around` stays there."""

@@ -387,7 +387,8 @@ class Composing:
 
         def accept(answer: tuple[Shadow, Plate] | None) -> None:
             if answer is None:
-                editor.say(t("No clear shadow was found · Press B to paint it out by hand"))
+                about = t("No clear shadow was found in the photo")
+                editor.say(about + " · " + t("Strength adds one, B paints an old one out"))
                 return
             shadow, plate = answer
             if is_known:

@@ -26,6 +26,7 @@ from ..export_plan import (
     format_of,
     is_folder,
 )
+from ..settings import pictures_folder
 from ..tasks import WRITE
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class Exporting:
         file = editor.source or editor.path
         last = Path(settings.export_folder)
         is_kept = file is None and settings.export_folder and last.is_dir()
-        folder = file.parent if file else (last if is_kept else Path.home())
+        folder = file.parent if file else (last if is_kept else pictures_folder())
         motion = next(
             (m for m in VideoMotion if m.value == settings.export_motion), VideoMotion.MORPH
         )

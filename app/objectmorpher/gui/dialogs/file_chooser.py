@@ -90,6 +90,8 @@ class FileChooser:
         endings = ", ".join(sorted({e[1:].upper().replace("JPEG", "JPG") for e in self._endings}))
         if self._dialog is Dialog.OPEN:  # of which there are twenty
             endings = t("A photo, a camera RAW file or a session")
+        elif self._dialog is Dialog.SAVE:
+            endings = t("A session (.omorph) keeps photo, objects and poses")
         about = t("{endings}. Type a name or a whole path, or choose below.", endings=endings)
         with modal(t(self._dialog.value), WIDTH, about, HEIGHT) as is_shown:
             if is_shown:
@@ -134,8 +136,7 @@ class FileChooser:
         for entry in self._entries:
             chosen = self._draw_entry(editor, entry) or chosen
         if not self._entries:
-            is_photo = self._dialog is Dialog.OPEN
-            note(t("No photos in this folder.") if is_photo else t("No such files here."))
+            note(_nothing_here(self._dialog))
         imgui.end_child()
         imgui.pop_style_var(2)
         imgui.pop_style_color()
@@ -215,6 +216,15 @@ class FileChooser:
         self._folder, self._is_first = folder.resolve(), True  # the field has the keys again
         self._thumbnails.forget()
         self._entries = folders + sorted(files, key=lambda e: e.name.lower())
+
+
+def _nothing_here(dialog: Dialog) -> str:
+    """What a folder says that has neither folders nor files of the kind that is asked for."""
+    if dialog is Dialog.OPEN:
+        return t("No photos in this folder.")
+    if dialog is Dialog.SAVE:
+        return t("No sessions in this folder yet.")
+    return t("No such files here.")
 
 
 def _draw_picture(picture: RGB | None, icon: str, start: ImVec2) -> None:

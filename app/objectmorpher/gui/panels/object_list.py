@@ -23,6 +23,7 @@ from ..widgets.widgets import (
     text_top,
 )
 from ..window.landmarks import mark
+from ..window.layout import has_panel
 
 ROW = 32.0  # points
 BETWEEN = 12.0  # points from a row to the next
@@ -34,6 +35,7 @@ BUTTONS = (
     (Icon.UP, "forward"), (Icon.DOWN, "backward"), (Icon.COPY, "duplicate"),
     (Icon.TRASH, "remove_object"),
 )  # fmt: skip
+FOLD = (Icon.SPLIT, "panel")  # where the button was that unfolded it: a second click folds it
 
 
 class _Typing:
@@ -72,12 +74,13 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
     """At the right what can be done with the current object."""
     top = imgui.get_cursor_pos_y()
     heading(t("Objects"))
-    if not has_buttons:
+    buttons = (*(BUTTONS if has_buttons else ()), *((FOLD,) if _is_in_the_way() else ()))
+    if not buttons:
         return
     end, gap = imgui.get_content_region_avail().x + imgui.get_cursor_pos_x(), theme.pt(2)
-    left = end - theme.pt(4) - len(BUTTONS) * theme.pt(SIDE) - (len(BUTTONS) - 1) * gap
+    left = end - theme.pt(4) - len(buttons) * theme.pt(SIDE) - (len(buttons) - 1) * gap
     imgui.push_font(None, SMALL_SIZE - 1)
-    for i, (icon, name) in enumerate(BUTTONS):
+    for i, (icon, name) in enumerate(buttons):
         imgui.same_line(left + i * (theme.pt(SIDE) + gap))
         imgui.set_cursor_pos_y(top - theme.pt(4))
         keys = keys_of(editor, name)
@@ -85,6 +88,11 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
         if icon_button(icon, name, hint, why_not(editor, name), SIDE):
             run(editor, name)
     imgui.pop_font()
+
+
+def _is_in_the_way() -> bool:
+    """Whether the window is so narrow that the panel is folded up unless it is asked for."""
+    return not has_panel(imgui.get_io().display_size.x, None)
 
 
 def _draw_object(editor: Editor, k: int) -> None:

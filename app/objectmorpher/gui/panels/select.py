@@ -259,11 +259,14 @@ def _draw_facts(editor: Editor) -> None:
 
 def _draw_front(editor: Editor, item: EditObject) -> None:
     """Whether it is not edited and stays in front."""
-    if why_not(editor, "keep_in_front") is not None:
+    if item.is_moved:
         return
+    reason = why_not(editor, "keep_in_front")
+    imgui.begin_disabled(reason is not None)  # there all the same, or all below it would jump
     if checkbox(t("Keep in front"), item.stays_in_front) != item.stays_in_front:
         run(editor, "keep_in_front")
-    tooltip(t("It is not edited, and covers what moves behind it"))
+    imgui.end_disabled()
+    tooltip(reason or t("It is not edited, and covers what moves behind it"))
 
 
 # The brush's numbers, for every tool that paints.
@@ -272,9 +275,9 @@ STEP = 0.2  # x the radius, of the - and + buttons
 
 
 def draw_radius(editor: Editor) -> None:
-    radius = editor.view.brush.radius
+    radius, usual = editor.view.brush.radius, editor.view.usual_radius
     step = max(STEP * radius, 0.5)  # a fifth of a large one is seen, and of a small one is left
-    number = Number(t("Radius"), "%.1f px", 0.25, step, 20.0, SMALLEST_BRUSH, LARGEST_BRUSH)
+    number = Number(t("Radius"), "%.1f px", 0.25, step, usual, SMALLEST_BRUSH, LARGEST_BRUSH)
     change = number_field(number, radius)
     if change.is_changed:
         editor.view.brush = replace(editor.view.brush, radius=change.value)

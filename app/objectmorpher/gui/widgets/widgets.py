@@ -54,6 +54,7 @@ pictures = Textures()
 
 
 LABEL_WIDTH = 72.0  # points, of the names left of the fields
+NAME_GAP = 4.0  # between a longer name and its field
 GAP = 8.0  # between two that stand side by side
 TIP_GAP = 8.0  # points between a control that the keyboard reached and its tooltip
 STEPPER = 24.0  # points, width of a field's - and + buttons
@@ -269,7 +270,8 @@ def number_field(number: Number, value: float) -> FieldChange:
     if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
         changed = FieldChange(number.rest, is_changed=value != number.rest, is_done=True)
     tooltip(t("Double-click resets it"))
-    imgui.same_line(theme.pt(LABEL_WIDTH))
+    room = imgui.calc_text_size(number.name).x + theme.pt(NAME_GAP)
+    imgui.same_line(max(theme.pt(LABEL_WIDTH), room))
     field = imgui.get_content_region_avail().x - 2 * theme.pt(STEPPER + 2)
     imgui.set_next_item_width(field)
     flags = imgui.SliderFlags_.always_clamp if number.low < number.high else 0

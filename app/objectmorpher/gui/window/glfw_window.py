@@ -44,10 +44,27 @@ def open_window(options: WindowOptions) -> Any:
     if not handle:
         glfw.terminate()
         raise WindowError(f"OpenGL 3.3 is not available: {'; '.join(errors)}")
+    if options.frames is None:
+        _keep_on_screen(handle)
     _set_icon(handle)
     glfw.make_context_current(handle)
     glfw.swap_interval(0 if options.frames is not None else 1)
     return handle
+
+
+def _keep_on_screen(handle: Any) -> None:
+    """Makes a window that is larger than the screen as large as that, with its frame."""
+    monitor = glfw.get_primary_monitor()
+    if not monitor:
+        return
+    x, y, *room = glfw.get_monitor_workarea(monitor)
+    left, top, right, bottom = glfw.get_window_frame_size(handle)
+    room = (room[0] - left - right, room[1] - top - bottom)
+    size = glfw.get_window_size(handle)
+    if min(room) <= 0 or (size[0] <= room[0] and size[1] <= room[1]):
+        return
+    glfw.set_window_size(handle, min(size[0], room[0]), min(size[1], room[1]))
+    glfw.set_window_pos(handle, x + left, y + top)
 
 
 def _set_icon(handle: Any) -> None:

@@ -53,18 +53,21 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
     if editor.looking.badge or is_split:
         draw_comparison(canvas)
     canvas.draw.pop_clip_rect()
-    draw_card(editor, rect)
+    draw_card(canvas)
 
 
 # A card over the photo that says how posing begins; it stays until the artist dismisses it.
 
 POSING = "posing"  # its name among the settings' dismissed cards
-ABOVE = 16.0  # points between it and the canvas's lower edge
+EDGE = 16.0  # points between it and the canvas's edges
+SIZE = (376.0, 158.0)  # points, about what it takes
+PLACES = ((0.5, 1.0), (0.0, 1.0), (0.5, 0.0), (0.0, 0.0), (1.0, 0.0))  # shares; the first is usual
 LEAST_CANVAS = 420.0  # points of the canvas each way, with less it would cover the photo
 
 
-def draw_card(editor: Editor, rect: Rect) -> None:
-    """For the Pose tool; `rect`: the canvas."""
+def draw_card(canvas: CanvasPainter) -> None:
+    """For the Pose tool."""
+    editor, rect = canvas.editor, canvas.rect
     view = editor.view
     is_posing = view.tool is ToolName.POSE and view.pose.mode is PoseMode.DRAG
     is_free = editor.is_lifted and editor.object is not None and not editor.object.is_locked
@@ -73,8 +76,11 @@ def draw_card(editor: Editor, rect: Rect) -> None:
         return
     if min(rect.width, rect.height) < theme.pt(LEAST_CANVAS) or view.is_before:
         return
-    foot = ImVec2(rect.x + rect.width / 2, rect.y + rect.height - theme.pt(ABOVE))
-    imgui.set_next_window_pos(foot, imgui.Cond_.always, ImVec2(0.5, 1.0))
+    across, down = _card_place(canvas)
+    edge = theme.pt(EDGE)
+    x = rect.x + edge + across * (rect.width - 2 * edge)
+    y = rect.y + edge + down * (rect.height - 2 * edge)
+    imgui.set_next_window_pos(ImVec2(x, y), imgui.Cond_.always, ImVec2(across, down))
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(16, 12))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(8))
     imgui.push_style_color(imgui.Col_.window_bg, theme.vec("panel"))
@@ -98,6 +104,23 @@ def draw_card(editor: Editor, rect: Rect) -> None:
     if button(t("Read more"), Emphasis.QUIET, width=104):
         view.help_page, view.popup = "bend", Popup.HELP
     imgui.end()
+
+
+def _card_place(canvas: CanvasPainter) -> tuple[float, float]:
+    """The one of PLACES at which the card covers least of the object that is to be dragged."""
+    editor, rect, size = canvas.editor, canvas.rect, np.array(SIZE) * theme.pt(1)
+    assert editor.document is not None
+    corners = canvas.at(editor.derived.frame(editor.document, editor.current).corners)
+    low, high = (np.array((corners[k].x, corners[k].y)) for k in (0, 2))
+    edge, start = theme.pt(EDGE), np.array((rect.x, rect.y))
+    room = np.array((rect.width, rect.height)) - 2 * edge - size
+
+    def covered(place: tuple[float, float]) -> float:
+        first = start + edge + np.array(place) * room
+        common = np.minimum(first + size, high) - np.maximum(first, low)
+        return float(np.prod(np.maximum(common, 0)))
+
+    return min(PLACES, key=covered)
 
 
 def _draw_line(gesture: str, meaning: str) -> None:
