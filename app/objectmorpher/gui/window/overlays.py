@@ -107,10 +107,13 @@ def draw_card(canvas: CanvasPainter) -> None:
 
 
 def _card_place(canvas: CanvasPainter) -> tuple[float, float]:
-    """The one of PLACES at which the card covers least of the object that is to be dragged."""
+    """The one of PLACES at which the card covers least of the object that is to be dragged.
+
+    During a stroke it stays where it was when the stroke began.
+    """
     editor, rect, size = canvas.editor, canvas.rect, np.array(SIZE) * theme.pt(1)
-    assert editor.document is not None
-    corners = canvas.at(editor.derived.frame(editor.document, editor.current).corners)
+    assert editor.committed is not None
+    corners = canvas.at(editor.derived.frame(editor.committed, editor.current).corners)
     low, high = (np.array((corners[k].x, corners[k].y)) for k in (0, 2))
     edge, start = theme.pt(EDGE), np.array((rect.x, rect.y))
     room = np.array((rect.width, rect.height)) - 2 * edge - size
