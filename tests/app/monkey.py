@@ -361,6 +361,8 @@ class Monkey:
             return
         x0, y0, x1, y1 = places[f"Menu: {title}"]
         self._player.write(f"{self._to((round((x0 + x1) / 2), round((y0 + y1) / 2)))}\nclick 1")
+        if not self._player.answered():
+            return
         end = time.monotonic() + 1.0
         while time.monotonic() < end:
             found = self._shown(title)
@@ -368,6 +370,7 @@ class Monkey:
                 self._player.write(self._to(self._rarest(found)) + "\nclick 1")
                 return
             time.sleep(0.02)
+        self._player.write("key Escape")  # out of the dialog that is in the way
 
     def _shown(self, title: str) -> dict[str, tuple[float, float, float, float]]:
         """The entries of a menu that are on the screen, by their label without what varies."""
