@@ -331,10 +331,13 @@ class Monkey:
         return self._player.write(f"keydown {held}\n{act}\nkeyup {held}")
 
     def _label(self) -> tuple[int, int]:
-        """The middle of something that has a label; the program's end is left to others."""
+        """The middle of something that has a label; the program's end is left to others.
+
+        Nothing is downloaded: it is offline, and would say so as an error.
+        """
         places = {
             label: area for label, area in self._player.hands.places().items()
-            if label not in (UPWARDS, ASKED, "Quit", "Pointer")
+            if label not in (UPWARDS, ASKED, "Quit", "Pointer", "Download")
         }  # fmt: skip
         if not places:
             return self._place()
