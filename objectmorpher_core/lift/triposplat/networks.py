@@ -78,10 +78,12 @@ class Places(nn.Module):
         self.gate_map = nn.Linear(form.width, inner, bias=False)
         self.content_map = nn.Linear(form.width, inner, bias=False)
         self.final_map = nn.Linear(inner, 3 * form.heads, bias=False)
+        # By its name: other libraries replace `linspace` while they load, and torch.device may
+        # have noted theirs as the one that it leads elsewhere.
+        device = torch.get_default_device()
         for axis, count in enumerate((third, third, form.width // form.heads // 2 - 2 * third)):
-            self.register_parameter(
-                f"freqs_{axis}", nn.Parameter(torch.linspace(LEAST, MOST, count))
-            )
+            rates = torch.linspace(LEAST, MOST, count, device=device)
+            self.register_parameter(f"freqs_{axis}", nn.Parameter(rates))
 
     def forward(self, x: Tensor) -> Tensor:
         x = self.norm(x)

@@ -131,3 +131,14 @@ def test_the_licence_of_its_encoder_has_to_be_accepted(folder, tmp_path):
     (folder / DINO).rename(tmp_path / "elsewhere")
     with pytest.raises(ModelError, match="dino_v3_vit_h"):
         models.use_folder("triposplat", folder)
+
+
+def test_networks_are_made_on_the_device_that_is_asked_for(monkeypatch) -> None:
+    """Also where torch.device overlooks linspace, which other libraries replace for a while."""
+    from torch.utils import _device
+
+    known = _device._device_constructors()
+    monkeypatch.setattr(_device, "_device_constructors", lambda: known - {torch.linspace})
+    with torch.device("meta"):
+        made = networks.Flow(networks.FORM), networks.Decoder(networks.FORM)
+    assert {p.device.type for network in made for p in network.parameters()} == {"meta"}
