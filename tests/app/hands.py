@@ -20,7 +20,6 @@ from PIL import Image, ImageGrab
 ROOT = Path(__file__).parents[2]
 ACCENT = (0x5A, 0xA9, 0xFF)
 PATIENCE = 180.0  # s, of a machine that has much else to do
-NUMBERS = range(90, 140)  # of X displays
 STILL = 0.4  # s without a change: nothing moves any more
 CALM = 12  # looks without a job: what still changes then is a caret
 
@@ -200,26 +199,19 @@ def opened(
 
 @contextmanager
 def x_display(width: int, height: int) -> Iterator[str | None]:
-    """An X display of our own, or None where no number is free."""
-    for number in NUMBERS:
-        socket = Path(f"/tmp/.X11-unix/X{number}")
-        if socket.exists() or Path(f"/tmp/.X{number}-lock").exists():
-            continue
-        command = ["Xvfb", f":{number}", "-screen", "0", f"{width}x{height}x24"]
-        command += ["-nolisten", "tcp", "-noreset"]
-        server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        for _ in range(100):
-            time.sleep(0.05)
-            if socket.exists() or server.poll() is not None:
-                break
-        if server.poll() is None:
-            try:
-                yield f":{number}"
-            finally:
-                server.terminate()
-                server.wait()
-            return
-    yield None
+    """An X display of our own, or None where there is none to be had."""
+    answer, told = os.pipe()
+    command = ["Xvfb", "-displayfd", str(told), "-screen", "0", f"{width}x{height}x24"]
+    command += ["-nolisten", "tcp", "-noreset"]
+    server = subprocess.Popen(command, stderr=subprocess.DEVNULL, pass_fds=(told,))
+    os.close(told)
+    try:
+        with os.fdopen(answer) as file:
+            number = file.readline().strip()  # which it has found free, and taken
+        yield f":{number}" if number else None
+    finally:
+        server.terminate()
+        server.wait()
 
 
 def window_environment(display: str, folder: Path, settings: str) -> dict[str, str]:
