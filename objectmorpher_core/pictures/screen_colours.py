@@ -49,13 +49,13 @@ def _shown(
 ) -> Image.Image:
     """A picture of the photo's colours in those of the screen, by way of those of a proof."""
     if proof is None:
-        return _turned(picture, photo, screen, "RGB")
+        return _converted(picture, photo, screen, "RGB")
     printed = ImageCms.ImageCmsProfile(io.BytesIO(proof))
     # In two steps, with whole numbers between them: one would let through what it cannot print.
-    return _turned(_turned(picture, photo, printed, _mode(printed)), printed, screen, "RGB")
+    return _converted(_converted(picture, photo, printed, _mode(printed)), printed, screen, "RGB")
 
 
-def _turned(
+def _converted(
     picture: Image.Image,
     one: ImageCms.ImageCmsProfile,
     other: ImageCms.ImageCmsProfile,
@@ -65,9 +65,9 @@ def _turned(
         one, other, picture.mode, mode,
         ImageCms.Intent.RELATIVE_COLORIMETRIC, ImageCms.Flags.BLACKPOINTCOMPENSATION,
     )  # fmt: skip
-    turned = ImageCms.applyTransform(picture, transform)
-    assert turned is not None, "it is not done in place"
-    return turned
+    converted = ImageCms.applyTransform(picture, transform)
+    assert converted is not None, "it is not done in place"
+    return converted
 
 
 def profile_name(profile: bytes, is_proof: bool = False) -> str | None:

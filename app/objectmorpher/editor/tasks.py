@@ -55,7 +55,7 @@ class Combine(Enum):
     """How an answer is combined with the selection that is there."""
 
     ANEW = "anew"  # instead of it
-    REFINED = "refined"  # the same, refined
+    REFINED = "refined"  # the same selection, with an edge that was found again
     ADDED = "added"
     REMOVED = "removed"
 

@@ -83,11 +83,11 @@ class LookingIntents:
 
     def proof_profile(self) -> bytes | None:
         """Return the ICC profile by which colours are proofed now; None: they are not."""
-        from ...system.desktop import read_profile
-
         chosen = self._editor.settings.proof_profile
         if not chosen or not self._editor.view.is_proof:
             return None
+        from ...system.desktop import read_profile
+
         return self._proofs(lambda: read_profile(Path(chosen)), chosen)
 
     def toggle_proof(self) -> None:

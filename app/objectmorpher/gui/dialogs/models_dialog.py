@@ -332,8 +332,8 @@ def _draw_facts(editor: Editor, shown: HubState) -> None:
     """Size, licence and source; the licence's box where it needs one; what is in the way."""
     hub, model = editor.models.hub, shown.model
     *needed, _ = wanted = hub.missing(model)
-    bytes = sum(each.size for each in wanted)
-    size = f"{bytes / 1e6:.0f} MB" if bytes < 1e9 else f"{bytes / 1e9:.1f} GB"
+    total = sum(each.size for each in wanted)
+    size = f"{total / 1e6:.0f} MB" if total < 1e9 else f"{total / 1e9:.1f} GB"
     if shown.is_own:
         note(t("In your folder {folder}", folder=shown.path.name))
     elif model.repository:
