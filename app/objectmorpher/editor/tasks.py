@@ -55,7 +55,7 @@ class Combine(Enum):
     """How an answer is combined with the selection that is there."""
 
     ANEW = "anew"  # instead of it
-    REFINED = "refined"  # the same selection, with an edge that was found again
+    REFINED = "refined"  # the same selection, by further clicks
     ADDED = "added"
     REMOVED = "removed"
 
