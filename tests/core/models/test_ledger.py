@@ -221,13 +221,13 @@ def test_two_jobs_at_a_time_share_what_is_there():
 
     def wait(weights: Weights, plan: Plan) -> None:
         inside.set()
-        assert leave.wait(10)
+        assert leave.wait(60)
         weights.work()
 
     first = Model("first", 0, need, there.opener("first"))
     running = threading.Thread(target=lambda: book.run(first, wait))
     running.start()
-    assert inside.wait(10)
+    assert inside.wait(60)
     try:
         second = Model("second", 0, need, there.opener("second"))
         assert book.plan(second).device == "cpu"
