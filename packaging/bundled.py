@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
+from collections.abc import Iterable
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 # Under the GPL; Python can do without each.
@@ -14,8 +17,24 @@ UNUSED_SCIPY = (
     "cluster", "datasets", "differentiate", "fftpack", "integrate", "interpolate", "io", "misc",
     "odr", "signal", "stats",
 )  # fmt: skip
-# Libraries that are built with symbols which only a debugger reads: 40 MB.
-WITH_SYMBOLS = ("libllvmlite.so", "zstandard/*.so")
+# Libraries that are built with symbols which only a debugger reads: 60 MB. None of those that a
+# wheel brings in a `.libs` folder: their headers were moved, and `strip` can break them.
+WITH_SYMBOLS = ("libllvmlite.so", "zstandard/*.so", "libpython3.*.so*")
+
+
+def strangers(shipped: Iterable[str]) -> list[str]:
+    """The modules that no distribution of `shipped` (names) brings, and this environment holds.
+
+    They belong to the tools that build the installer. What is shipped asks for some of them where
+    they are there (trimesh for lxml); they would go along, without their licences.
+    """
+    own = {_normal(name) for name in shipped}
+    owners = packages_distributions().items()
+    return sorted(name for name, of in owners if not own & {_normal(one) for one in of})
+
+
+def _normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def check(folder: Path) -> None:

@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 LOCKS = sorted((ROOT / "packaging" / "locks").glob("*.txt"))
 sys.path.append(str(ROOT / "packaging"))
 
+import bundled  # noqa: E402
 import licences  # noqa: E402
 
 from objectmorpher.gui.widgets import theme  # noqa: E402
@@ -46,6 +47,13 @@ def test_no_package_that_is_needed_to_run_is_under_the_gpl() -> None:
     assert len(found) >= 15
     assert [one.package for one in found if not one.terms] == []
     assert [(one.package, one.terms) for one in found if one.is_copyleft] == []
+
+
+def test_what_is_not_needed_to_run_is_kept_out_of_the_installers() -> None:
+    """Such as pytest, of which no licence would go along."""
+    kept_out = set(bundled.strangers(package.name for package in licences.run_time()))
+    assert {"pytest", "hypothesis"} <= kept_out
+    assert {"numpy", "PIL", "cv2", "imgui_bundle", "markdown_it"} & kept_out == set()
 
 
 def test_the_page_names_all_that_is_needed_to_run() -> None:
