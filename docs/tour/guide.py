@@ -91,6 +91,27 @@ class Guide(Hands):
         x, y = self.place(label)
         self.drag((x, y), (x + pixels, y))
 
+    def reach(self, label: str) -> None:
+        """Turn the wheel over the panel until it shows `label`, and a little farther."""
+        self._point_at_panel()
+        for _ in range(30):
+            if label in self.places():
+                break
+            self.xdotool("click", 5)
+            self.settle()
+        self.xdotool("click", "--repeat", 2, 5)
+        self.settle()
+
+    def rewind(self) -> None:
+        """Turn the wheel over the panel until its top is shown."""
+        self._point_at_panel()
+        self.xdotool("click", "--repeat", 40, "--delay", 20, 4)
+        self.settle()
+
+    def _point_at_panel(self) -> None:
+        x, y = self.place("Export photo…")
+        self.point((x, y - 150))
+
     def shoot(self, title: str, text: str) -> None:
         """A picture of the window as soon as it stands still."""
         pixels = self.settle()

@@ -33,7 +33,7 @@ def _tilt_head(guide: Guide) -> None:
     guide.choose("Open a photo…")
     guide.area("One folder up")
     guide.settle()
-    guide.xdotool("type", "--delay", 20, "Pictures/astronaut.jpg")
+    guide.xdotool("type", "--delay", 20, "astronaut.jpg")
     guide.shoot("Open", "Where the desktop has no file dialog, the editor has its own.")
     guide.press("Return")
     guide.point(EMPTY)
@@ -80,10 +80,12 @@ def _tilt_head(guide: Guide) -> None:
     split(guide, (268, 256), "A line that is dragged: the photo on its left, the edit on its "
           "right.")  # fmt: skip
     guide.choose("Tool: Compose")
+    guide.reach("Harmonise")
     guide.choose("Harmonise")
     guide.point(guide.at(480, 256))
     guide.shoot("Compose", "What joins object and photo: background, shadow, light, edge. Here she "
                 "takes on the light of her new place.")  # fmt: skip
+    guide.rewind()
     guide.press("b")
     guide.area("Radius")
     guide.drag(guide.at(110, 183), guide.at(118, 193))
@@ -149,6 +151,7 @@ def _turn_cup(guide: Guide) -> None:
     look(guide, (300, 220), (250, 200), "The cup from elsewhere, as far as one photo tells.")
     split(guide, (280, 200), "Photo and edit.")
     guide.choose("Tool: Compose")
+    guide.reach("Strength")
     guide.pull("Strength", 90)
     guide.shoot("Compose", "A shadow on the table, its direction on a dial.")
     guide.press("b")
