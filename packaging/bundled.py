@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import subprocess
 from collections.abc import Iterable
 from importlib.metadata import packages_distributions
 from pathlib import Path
+
+from packaging.utils import canonicalize_name
 
 # Under the GPL; Python can do without each.
 GPL = ("libreadline", "readline.", "libgdbm", "_gdbm", "libdb-5")
@@ -23,18 +24,14 @@ WITH_SYMBOLS = ("libllvmlite.so", "zstandard/*.so", "libpython3.*.so*")
 
 
 def strangers(shipped: Iterable[str]) -> list[str]:
-    """The modules that no distribution of `shipped` (names) brings, and this environment holds.
+    """Return the modules of this environment that no distribution of `shipped` (names) brings.
 
-    They belong to the tools that build the installer. What is shipped asks for some of them where
-    they are there (trimesh for lxml); they would go along, without their licences.
+    They belong to the tools that build the installer. What is shipped imports some of them where
+    they are there (trimesh lxml); they would go along, without their licences.
     """
-    own = {_normal(name) for name in shipped}
+    own = {canonicalize_name(name) for name in shipped}
     owners = packages_distributions().items()
-    return sorted(name for name, of in owners if not own & {_normal(one) for one in of})
-
-
-def _normal(name: str) -> str:
-    return re.sub(r"[-_.]+", "-", name).lower()
+    return sorted(name for name, of in owners if not own & {canonicalize_name(one) for one in of})
 
 
 def check(folder: Path) -> None:
