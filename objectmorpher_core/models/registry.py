@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 # The program's own weights, which come with it (docs/shape_network).
 
-PACKAGE, SHAPE = "objectmorpher_core.models", "shape.onnx"
+PACKAGE, SHAPE, SHADOW = "objectmorpher_core.models", "shape.onnx", "shadow.onnx"
 TOKENS = "dinov2-vits14"  # the weight whose tokens the shape network reads
 
 
@@ -23,6 +23,11 @@ def is_shipped() -> bool:
 def shape_network() -> bytes:
     """The shape network, an ONNX file. Raises FileNotFoundError."""
     return files(PACKAGE).joinpath(SHAPE).read_bytes()
+
+
+def shadow_network() -> bytes:
+    """The shadow network, an ONNX file. Raises FileNotFoundError."""
+    return files(PACKAGE).joinpath(SHADOW).read_bytes()
 
 
 LicenceKind = Literal["permissive", "non-commercial", "gated"]

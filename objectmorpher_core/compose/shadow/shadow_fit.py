@@ -8,9 +8,11 @@ for where the object goes.
 
 A shadow begins where the object touches the ground, ends at an edge all around, takes light of
 all colours alike, is darker than what else is beside the object, and the photo is explained by it
-better than by none. Each of these is a number; their weighted sum must exceed a margin. The
-weights are those of a logistic regression on half of the scenes of tests/shadow_scenes.py, and on
-those of docs/compositing, which says how often the other half is right.
+better than by none. Each of these is a number. A small network looks at the same surroundings
+(`shadow_look`): how sure it is of a shadow, and how far that lies where the fitted one does, are
+numbers, too. The weighted sum of all must exceed a margin. The weights are those of logistic
+regressions on half of the scenes of tests/shadow_scenes.py; docs/compositing shows how often it is
+right on the other half.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from ...document.model import Matte
 from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, FROM_ABOVE, OldShadow
 from .shadow import DARKEST, GAMMA
+from .shadow_look import SeenShadow, look_for_shadow
 from .shadow_shear import Flat, ShadowSheet, lie, stand
 
 # Linear regression that outliers do not spoil (Huber's loss, iteratively reweighted).
@@ -71,6 +74,11 @@ WEIGHTS = {
     "gain": 2.62, "others": -1.47, "joined": 1.79, "whole": 1.97, "tint": -1.08, "behind": 2.77,
 }  # fmt: skip
 BIAS = -4.81
+# The joint weight of the sum of these, of the network's log odds, and of its agreement.
+JOINT = {"fit": 0.0, "odds": 0.0, "overlap": 0.0, "inside": 0.0}
+JOINT_BIAS = 0.0
+MOST_FIT = 8.0  # either way, that the sum counts
+SHADED = (0.05, 0.25)  # natural logarithm of light that was fitted, over which it becomes a shade
 MOST_TINT = 0.6  # x its darkness: what changes colours by more is another material
 SURE = 2.1  # margin: 11 of 295 scenes without a shadow that were held out have a higher score
 LIKELY = 0.7  # margin where somebody has asked for the shadow, sees it outlined, and can refuse
@@ -129,12 +137,36 @@ def fitted(seen: Surroundings, found: TriedShadow) -> F32:
     return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
 
 
-def score(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> float:
+def score(
+    seen: Surroundings, ground: ShadowGround, found: TriedShadow, looked: SeenShadow
+) -> float:
     """Return the evidence for the shadow against other dark things (see SURE); -inf for none."""
     numbers = evidence(seen, ground, found)
     if numbers["tint"] > MOST_TINT:
         return -np.inf
-    return sum(weight * numbers[name] for name, weight in WEIGHTS.items()) + BIAS
+    joint = joint_evidence(seen, found, looked, numbers)
+    return sum(weight * joint[name] for name, weight in JOINT.items()) + JOINT_BIAS
+
+
+def joint_evidence(
+    seen: Surroundings, found: TriedShadow, looked: SeenShadow, numbers: dict[str, float]
+) -> dict[str, float]:
+    """Return the evidence by the names of JOINT, of that of WEIGHTS.
+
+    "overlap" is the intersection over union of the fitted shade and the network's, "inside" the
+    mean of the network's in the core of the fitted one.
+    """
+    fit = sum(weight * numbers[name] for name, weight in WEIGHTS.items()) + BIAS
+    joint = {"fit": float(np.clip(fit, -MOST_FIT, MOST_FIT)), "odds": looked.odds}
+    thrown, free = fitted(seen, found), seen.free
+    if not free.any():
+        return joint | {"overlap": 0.0, "inside": 0.0}
+    low, high = SHADED
+    shade = np.clip((thrown - low) / (high - low), 0, 1)[free]
+    other, core = looked.shade[free], thrown[free] > 0.5 * thrown[free].max()
+    overlap = np.minimum(shade, other).sum() / max(float(np.maximum(shade, other).sum()), 1e-3)
+    inside = float(other[core].mean()) if core.any() else 0.0
+    return joint | {"overlap": float(overlap), "inside": inside}
 
 
 def evidence(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> dict[str, float]:
@@ -267,10 +299,11 @@ def find_old_shadow(
         seen = _look(pixels, matte, others, slope)
     except ValueError:  # it is thinner than what is looked at
         return None
-    told = _told(seen, LENGTHS, margin) if seen_from is None or seen_from < STEEP else None
+    looked = look_for_shadow(seen.brightness, seen.colour, seen.cover, seen.free)
+    told = _told(seen, looked, LENGTHS, margin) if seen_from is None or seen_from < STEEP else None
     if seen_from is None or seen_from >= STEEP:
         flat = replace(seen, standing=lie(seen.cover))
-        lying = _told(flat, FLAT_LENGTHS, margin)
+        lying = _told(flat, looked, FLAT_LENGTHS, margin)
         least = max(LEAST_FLAT, 0.0 if told is None else told[1].gain)
         if lying is not None and lying[1].gain > least:
             seen, told = flat, lying
@@ -289,16 +322,16 @@ def find_old_shadow(
 
 
 def _told(
-    seen: Surroundings, lengths: tuple[float, ...], margin: float
+    seen: Surroundings, looked: SeenShadow, lengths: tuple[float, ...], margin: float
 ) -> tuple[ShadowGround, TriedShadow] | None:
     """The ground and the shadow on it; None where none is sure."""
     ground = _ground(seen)
-    found = None if ground is None else _searched(seen, ground, lengths)
+    found = None if ground is None else _searched(seen, looked, ground, lengths)
     if ground is None or found is None:
         return None
     if isinstance(seen.standing, Flat):  # a large part of what one sees may lie in its shadow
         ground = replace(ground, scale=min(ground.scale, found.scale))
-    if score(seen, ground, found) <= margin:
+    if score(seen, ground, found, looked) <= margin:
         return None
     return ground, found
 
@@ -393,7 +426,7 @@ def _tried(seen: Surroundings, ground: ShadowGround, shadow: Shadow) -> TriedSha
 
 
 def _searched(
-    seen: Surroundings, ground: ShadowGround, lengths: tuple[float, ...]
+    seen: Surroundings, looked: SeenShadow, ground: ShadowGround, lengths: tuple[float, ...]
 ) -> TriedShadow | None:
     """Of all directions and lengths what most speaks for, then the best that lies around it."""
     few = _thinned(ground, seen.cover.shape[1])
@@ -401,7 +434,7 @@ def _searched(
     gained = sorted((f for f in tried if f is not None), key=lambda f: -f.gain)
     if not gained:
         return None
-    best = max(_distinct(gained), key=lambda f: score(seen, few, f))
+    best = max(_distinct(gained), key=lambda f: score(seen, few, f, looked))
     for step, factor in FINER:
         for shadow in _around(best.shadow, step, factor):
             other = _tried(seen, few, shadow)

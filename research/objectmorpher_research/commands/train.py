@@ -28,6 +28,10 @@ def add_train(parser: argparse.ArgumentParser) -> None:
             "shape", "the shape network, on endless made-up objects", _add_shape, _train_shape
         ),
         Subcommand(
+            "shadow", "the network that finds shadows, on endless made-up scenes", _add_shadow,
+            _train_shadow,
+        ),
+        Subcommand(
             "pairs", "triplets for the LoRA, out of pairs of pictures", _add_pairs, _make_pairs
         ),
         Subcommand(
@@ -48,6 +52,17 @@ def _add_shape(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=int, default=0, help="0 to 49; another seed draws other samples")
     add("-o", "--output", type=Path, metavar="F.onnx", help="default: shape.onnx in the folder")
     add("--report", type=Path, metavar="F.json", help="figures; default: beside the weights")
+
+
+def _add_shadow(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Trains on endless made-up scenes; called again it goes on."
+    add = parser.add_argument
+    add("--folder", type=Path, required=True, metavar="DIR", help="scenes and checkpoints")
+    add("--scenes", type=int, default=2880, metavar="N", help="to draw, default 2880")
+    add("--steps", type=int, default=5000, metavar="N", help="of 32 samples, default 5000")
+    add("--minutes", type=float, metavar="M", help="at most; go on with another call")
+    add("--seed", type=int, default=0, help="another one draws other scenes")
+    add("-o", "--output", type=Path, metavar="F.onnx", help="default: shadow.onnx in the folder")
 
 
 def _add_pairs(parser: argparse.ArgumentParser) -> None:
@@ -240,6 +255,21 @@ def _absent(*modules: str) -> str:
     """Packages of these that are not installed, in words."""
     names = [NEEDED.get(module, module) for module in modules if find_spec(module) is None]
     return " and ".join(names)
+
+
+def _train_shadow(options: argparse.Namespace) -> None:
+    """Makes scenes, trains, and writes weights."""
+    if absent := _absent(*NEEDED):
+        raise UsageError(f"training needs {absent}: `pip install {absent.replace(' and ', ' ')}`")
+    if min(options.scenes, options.steps) < 1 or options.seed < 0:
+        raise UsageError("--scenes and --steps are at least 1, --seed is not negative")
+    from ..training.train_shadow import ShadowPlan, export, train
+
+    plan = ShadowPlan(options.scenes, options.steps, seed=options.seed)
+    with progress_bar("training") as progress:
+        net = train(options.folder, plan, options.minutes, progress)
+    output = options.output or options.folder / "shadow.onnx"
+    print(f"{output}: {export(net, output)}")
 
 
 def _train_shape(options: argparse.Namespace) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor, nn
 
 from objectmorpher_core.lift.crop import SIDE
 
@@ -25,12 +27,20 @@ def export(net: ShapeNet, path: Path) -> str:
     keeps its name and its form, so that training can go on from the file (`weights_of`); what can
     be joined, as normalisations into convolutions, onnxruntime joins when it opens it.
     """
+    inputs = (torch.zeros(1, PLANES, SIDE, SIDE), torch.zeros(1, WIDTH, GRID, GRID))
+    return write_onnx(net, inputs, path, INPUTS, (OUTPUT,))
+
+
+def write_onnx(
+    net: nn.Module, inputs: tuple[Tensor, ...], path: Path, names: Sequence[str],
+    outputs: Sequence[str],
+) -> str:  # fmt: skip
+    """Write any network as `export` does; its SHA-256."""
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
-    inputs = (torch.zeros(1, PLANES, SIDE, SIDE), torch.zeros(1, WIDTH, GRID, GRID))
     torch.onnx.export(
-        net.eval(), inputs, path, input_names=list(INPUTS), output_names=[OUTPUT],
+        net.eval(), inputs, path, input_names=list(names), output_names=list(outputs),
         opset_version=OPSET, dynamo=False, do_constant_folding=False,
         training=torch.onnx.TrainingMode.PRESERVE,
     )  # fmt: skip

@@ -171,7 +171,7 @@ class _State:
         """Take one step."""
         self.net.train()
         for group in self.optimiser.param_groups:
-            group["lr"] = self.plan.rate * _schedule(self.step / self.plan.steps)
+            group["lr"] = self.plan.rate * schedule(self.step / self.plan.steps)
         batch = _on(batch, self.device)
         with _quick_numbers(self.device):
             planes = batch.planes.contiguous(memory_format=torch.channels_last)
@@ -204,7 +204,7 @@ class _State:
         os.replace(partial, self.file)
 
 
-def _schedule(share: float) -> float:
+def schedule(share: float) -> float:
     """Up, and down along a cosine."""
     if share < WARM_UP:
         return share / WARM_UP

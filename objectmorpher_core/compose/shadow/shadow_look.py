@@ -1,0 +1,89 @@
+"""A look by the shadow network at a thing's surroundings: where its shadow lies, and how surely.
+
+The network is ours (`objectmorpher train shadow`) and comes with the program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, Mask
+from ...models import registry
+from ...models.onnx_session import open_session
+
+SIDE, THING = 96, 32  # cells of what the network sees, and of the thing's longer side in it
+PLANES = 5
+SEEN = 0.02  # of a cell, that the thing covers where it is looked at
+MOSTLY = 0.75  # of a cell that is ground
+BRIGHT, COLOUR = 3.0, 1.5  # natural logarithms, beyond which nothing is told apart
+
+
+@dataclass(frozen=True, eq=False)
+class SeenShadow:
+    """What the network finds."""
+
+    shade: F32  # (h, w) probability that the thing takes light from the ground there
+    odds: float  # log odds that it throws a shadow that one sees
+
+
+def planes_of(brightness: F32, colour: F32, cover: F32, free: Mask) -> F32:
+    """(PLANES, h, w) what the network sees, from natural logarithms of linear light.
+
+    `brightness` (h, w), `colour` (h, w, 2) ratios of red and blue to green, `cover` (h, w) of the
+    thing, `free` (h, w) where the ground is seen. Brightness and colour are those of the middle of
+    the ground, more or less.
+    """
+    middle = float(np.median(brightness[free])) if free.any() else 0.0
+    tone = np.median(colour[free], 0) if free.any() else np.zeros(2)
+    is_seen = free | (cover > SEEN)
+    light = np.clip(brightness - middle, -BRIGHT, BRIGHT) * is_seen
+    tints = np.clip(colour - tone, -COLOUR, COLOUR) * is_seen[..., None]
+    planes = [light, tints[..., 0], tints[..., 1], cover, free.astype(np.float32)]
+    return np.stack(planes).astype(np.float32)
+
+
+def look_for_shadow(brightness: F32, colour: F32, cover: F32, free: Mask) -> SeenShadow:
+    """Look at surroundings (h, w) on a grid on which the thing is 2 THING cells long.
+
+    Its middle is the grid's; otherwise as `planes_of`.
+    """
+    parts = (brightness, colour, cover, free.astype(np.float32))
+    small = [_shrunk(part) for part in parts]
+    planes = planes_of(small[0], small[1], small[2], small[3] > MOSTLY)
+    shade, odds = _session().run(None, {"planes": planes[None]})
+    chance = 1 / (1 + np.exp(-np.asarray(shade[0], np.float32)))
+    whole = cv2.resize(chance, (2 * SIDE, 2 * SIDE), interpolation=cv2.INTER_LINEAR)
+    return SeenShadow(_middle(whole, *brightness.shape), float(odds[0]))
+
+
+@cache
+def _session() -> Any:
+    return open_session(registry.shadow_network())
+
+
+def _shrunk(field: F32) -> F32:
+    """A field (h, w) or (h, w, n) in the middle of 2 SIDE cells, at half the resolution."""
+    whole = _middle(np.asarray(field, np.float32), 2 * SIDE, 2 * SIDE)
+    return np.asarray(cv2.resize(whole, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _middle(field: F32, height: int, width: int) -> F32:
+    """The middle (height, width) of a field, 0 beyond it."""
+    found = np.zeros((height, width, *field.shape[2:]), np.float32)
+    rows, columns = (
+        _overlap(has, wanted) for has, wanted in zip(field.shape[:2], (height, width), strict=True)
+    )
+    found[rows[1], columns[1]] = field[rows[0], columns[0]]
+    return found
+
+
+def _overlap(has: int, wanted: int) -> tuple[slice, slice]:
+    """Where a row of `has` cells and one of `wanted`, in whose middle it is, meet: in each."""
+    start, offset = max((has - wanted) // 2, 0), max((wanted - has) // 2, 0)
+    count = min(has, wanted)
+    return slice(start, start + count), slice(offset, offset + count)

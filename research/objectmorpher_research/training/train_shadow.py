@@ -1,0 +1,283 @@
+"""`objectmorpher train shadow`: scenes, training, and the weights that are shipped.
+
+Scenes are kept in one folder, and so is what was learned: called again it goes on where it was
+stopped. Samples are made of scenes as fast as the other cores allow, and each is used a few times;
+so two runs of the same plan are alike, and not the same.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing.queues import Queue
+from pathlib import Path
+from queue import Empty
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from objectmorpher_core.base.progress import Progress, part, silent
+from objectmorpher_core.compose.shadow.shadow_look import PLANES, SEEN, SIDE
+
+from .export_shape import write_onnx
+from .shadow_net import ShadowNet
+from .shadows.grounds import Grounds
+from .shadows.samples import ShadowSample, make_sample
+from .shadows.scenes import SceneGeometry, make_geometry, packed, unpacked
+from .shadows.solids import silhouettes
+from .train_shape import MEMORY, schedule
+
+SHARD = 64  # scenes in a file, and samples that are handed over at once
+BOARDS, BOARDS_SEED = 160, 5
+OPEN, OTHER_FILE = 8, 0.25  # files of scenes that are at hand; how often one of them is replaced
+RING = 16_000  # samples that are kept
+LEAST = 512  # of them, before anything is learned
+RATE, DECAY, STEEPEST = 2e-3, 0.02, 2.0
+FAINT, CLEAR = 0.06, 0.18  # share of light that is taken, between which a cell is half in shade
+SHADE, MAP = 2.0, 4.0  # more weight of what is in shade, and of the map over the verdict
+LEAST_CELLS = 50.0
+SAVED = 120.0  # s between two checkpoints
+INPUT, OUTPUTS = "planes", ("shade", "odds")
+
+
+@dataclass(frozen=True)
+class ShadowPlan:
+    """A plan of training."""
+
+    scenes: int = 2880
+    steps: int = 5000
+    size: int = 32  # samples at a time
+    seed: int = 0
+
+
+class ShadowLosses(NamedTuple):
+    """Of where the shade lies, and of whether there is any."""
+
+    shade: Tensor
+    verdict: Tensor
+
+
+def write_scenes(folder: Path, plan: ShadowPlan, progress: Progress = silent) -> list[Path]:
+    """Files of scenes, those that are not there yet, in all cores."""
+    folder.mkdir(parents=True, exist_ok=True)
+    numbers = range(-(-plan.scenes // SHARD))
+    files = [folder / f"{plan.seed:02d}-{number:05d}.npz" for number in numbers]
+    wanted = [(f, plan.seed, n) for f, n in zip(files, numbers, strict=True) if not f.exists()]
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        for done, _ in enumerate(pool.map(_write, wanted), 1):
+            progress(done / len(wanted), f"{done * SHARD} of {len(wanted) * SHARD} scenes")
+    return files
+
+
+def _write(job: tuple[Path, int, int]) -> None:
+    file, seed, number = job
+    cv2.setNumThreads(1)
+    shapes = silhouettes(BOARDS, BOARDS_SEED)
+    scenes = [make_geometry(np.random.default_rng([seed, number, k]), shapes) for k in range(SHARD)]
+    partial = file.with_suffix(".part")
+    with partial.open("wb") as out:
+        np.savez(out, allow_pickle=False, **packed(scenes))
+    partial.rename(file)
+
+
+@dataclass(eq=False)
+class SampleRing:
+    """The newest samples."""
+
+    count: int = RING
+    made: int = 0
+    planes: np.ndarray = field(init=False)
+    fields: np.ndarray = field(init=False)  # (count, 2, s, s) what is dark, and what counts
+    labels: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.planes = np.zeros((self.count, PLANES, SIDE, SIDE), np.float16)
+        self.fields = np.zeros((self.count, 2, SIDE, SIDE), np.float16)
+        self.labels = np.zeros(self.count, np.float32)
+
+    def add(self, planes: np.ndarray, fields: np.ndarray, labels: np.ndarray) -> None:
+        """Add samples, over the oldest ones."""
+        where = (self.made + np.arange(len(labels))) % self.count
+        self.planes[where], self.fields[where], self.labels[where] = planes, fields, labels
+        self.made += len(labels)
+
+    def drawn(self, rng: np.random.Generator, size: int) -> tuple[Tensor, Tensor, Tensor]:
+        """Planes, fields and labels of a few, mirrored, brightened and blurred by noise."""
+        which = rng.integers(min(self.made, self.count), size=size)
+        arrays = (self.planes, self.fields, self.labels)
+        planes, fields, labels = (torch.from_numpy(a[which].astype(np.float32)) for a in arrays)
+        turned = torch.from_numpy(rng.random(size) < 0.5)
+        planes[turned], fields[turned] = planes[turned].flip(-1), fields[turned].flip(-1)
+        is_seen = ((planes[:, 3] > SEEN) | (planes[:, 4] > 0)).float()
+        gain, shift, noise = (
+            torch.from_numpy(v.astype(np.float32).reshape(-1, 1, 1))
+            for v in (np.exp(rng.normal(0, 0.2, size)), rng.normal(0, 0.15, size),
+                      rng.uniform(0, 0.04, size))
+        )  # fmt: skip
+        noisy = planes[:, 0] * gain + shift + noise * torch.randn(size, SIDE, SIDE)
+        planes[:, 0] = noisy * is_seen
+        tint = torch.from_numpy(rng.uniform(0.5, 1.3, (size, 1, 1, 1)).astype(np.float32))
+        planes[:, 1:3] *= tint
+        return planes, fields, labels
+
+
+def arrays_of(samples: list[ShadowSample]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `SampleRing.add` takes."""
+    fields = [np.stack([s.dark, s.weight]) for s in samples]
+    return (
+        np.stack([s.planes for s in samples]).astype(np.float16),
+        np.stack(fields).astype(np.float16),
+        np.array([s.label for s in samples], np.float32),
+    )
+
+
+def _make_samples(files: list[Path], seed: int, ready: Queue) -> None:
+    """Make samples for ever."""
+    cv2.setNumThreads(1)
+    rng = np.random.default_rng(seed)
+    grounds, scenes = Grounds(rng), [_read(rng, files)]
+    while True:
+        if len(scenes) < OPEN:
+            scenes.append(_read(rng, files))
+        elif rng.random() < OTHER_FILE:
+            scenes[rng.integers(OPEN)] = _read(rng, files)
+        made = []
+        for _ in range(SHARD):
+            one, other = (scenes[rng.integers(len(scenes))] for _ in range(2))
+            pair = one[rng.integers(len(one))], other[rng.integers(len(other))]
+            made.append(make_sample(rng, *pair, grounds))
+        ready.put(arrays_of(made))
+
+
+def _read(rng: np.random.Generator, files: list[Path]) -> list[SceneGeometry]:
+    with np.load(files[rng.integers(len(files))], allow_pickle=False) as kept:
+        return unpacked({name: kept[name] for name in kept.files})
+
+
+def losses(net: ShadowNet, planes: Tensor, fields: Tensor, labels: Tensor) -> ShadowLosses:
+    """Cross entropies of the map and of the verdict; a label that is NaN has none."""
+    shade, odds = net(planes.contiguous(memory_format=torch.channels_last))
+    dark, weight = fields[:, 0], fields[:, 1]
+    wanted = ((dark - FAINT) / (CLEAR - FAINT)).clamp(0, 1)
+    off = functional.binary_cross_entropy_with_logits(shade, wanted, reduction="none")
+    off = (off * weight * (1 + SHADE * wanted)).sum((1, 2))
+    known = ~torch.isnan(labels)
+    verdict = functional.binary_cross_entropy_with_logits(odds[known], labels[known])
+    return ShadowLosses((off / weight.sum((1, 2)).clamp(min=LEAST_CELLS)).mean(), verdict)
+
+
+class ShadowState:
+    """The network, what trains it, and how far it is."""
+
+    def __init__(self, file: Path, plan: ShadowPlan) -> None:
+        torch.manual_seed(plan.seed)
+        self.file, self.plan, self.step = file, plan, 0
+        self.net = ShadowNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.mean = {k: v.clone() for k, v in self.net.state_dict().items()}
+        self.optimiser = torch.optim.AdamW(self.net.parameters(), RATE, weight_decay=DECAY)
+        self.loss = 0.0
+        if file.exists():
+            kept = torch.load(file, weights_only=True)
+            if kept["plan"] == repr(plan):
+                self.net.load_state_dict(kept["net"])
+                self.optimiser.load_state_dict(kept["optimiser"])
+                self.mean, self.step = kept["mean"], kept["step"]
+
+    def learn(self, planes: Tensor, fields: Tensor, labels: Tensor) -> ShadowLosses:
+        """Take one step."""
+        self.net.train()
+        for group in self.optimiser.param_groups:
+            group["lr"] = RATE * schedule(self.step / self.plan.steps)
+        parts = losses(self.net, planes, fields, labels)
+        whole = MAP * parts.shade + parts.verdict
+        self.optimiser.zero_grad(set_to_none=True)
+        whole.backward()
+        torch.nn.utils.clip_grad_norm_(self.net.parameters(), STEEPEST)
+        self.optimiser.step()
+        self.step += 1
+        kept = min(MEMORY, (1 + self.step) / (10 + self.step))
+        for name, value in self.net.state_dict().items():
+            if value.is_floating_point():
+                self.mean[name].lerp_(value, 1 - kept)
+            else:
+                self.mean[name].copy_(value)
+        self.loss += (float(whole.detach()) - self.loss) / min(self.step, 50)
+        return parts
+
+    def save(self) -> None:
+        """Save all that going on takes."""
+        partial = self.file.with_suffix(".part")
+        kept = {
+            "net": self.net.state_dict(), "mean": self.mean, "step": self.step,
+            "optimiser": self.optimiser.state_dict(), "plan": repr(self.plan),
+        }  # fmt: skip
+        torch.save(kept, partial)
+        os.replace(partial, self.file)
+
+    def trained(self) -> ShadowNet:
+        """The mean of the weights, ready to predict."""
+        net = ShadowNet()
+        net.load_state_dict(self.mean)
+        return net.eval()
+
+
+def train(
+    folder: Path, plan: ShadowPlan, minutes: float | None = None, progress: Progress = silent
+) -> ShadowNet:
+    """Train in `folder`, for so many minutes at most."""
+    files = write_scenes(folder / "scenes", plan, part(progress, 0.0, 0.2))
+    state = ShadowState(folder / "shadow.pt", plan)
+    begun = saved = time.monotonic()
+    spawn, rng = (
+        multiprocessing.get_context("spawn"),
+        np.random.default_rng([plan.seed, state.step]),
+    )
+    ready = spawn.Queue(4)
+    makers = [
+        spawn.Process(target=_make_samples, args=(files, plan.seed + 1000 * k, ready), daemon=True)
+        for k in range(max((os.cpu_count() or 2) - 1, 1))
+    ]
+    for maker in makers:
+        maker.start()
+    try:
+        ring = SampleRing()
+        while state.step < plan.steps and not (minutes and _since(begun) > 60 * minutes):
+            _take(ring, ready)
+            state.learn(*ring.drawn(rng, plan.size))
+            progress(0.2 + 0.8 * state.step / plan.steps, f"loss {state.loss:.3f}")
+            if _since(saved) > SAVED:
+                state.save()
+                saved = time.monotonic()
+    finally:
+        for maker in makers:
+            maker.terminate()
+    state.save()
+    return state.trained()
+
+
+def _since(start: float) -> float:
+    return time.monotonic() - start
+
+
+def _take(ring: SampleRing, ready: Queue) -> None:
+    """All that is ready; at the start, as many samples as learning begins with."""
+    while ring.made < LEAST:
+        ring.add(*ready.get())
+    while True:
+        try:
+            ring.add(*ready.get_nowait())
+        except Empty:
+            return
+
+
+def export(net: ShadowNet, path: Path) -> str:
+    """Write `path`, an ONNX file of half-precision weights; its SHA-256."""
+    inputs = (torch.zeros(1, PLANES, SIDE, SIDE),)
+    return write_onnx(net, inputs, path, (INPUT,), OUTPUTS)

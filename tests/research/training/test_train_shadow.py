@@ -1,0 +1,123 @@
+"""Shadow scenes are what they say, and the network learns from them and runs without torch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs torch")
+
+from objectmorpher_core.compose.shadow.shadow_look import PLANES, SIDE, THING  # noqa: E402
+from objectmorpher_core.models.onnx_session import open_session  # noqa: E402
+from objectmorpher_research.training import train_shadow  # noqa: E402
+from objectmorpher_research.training.shadow_net import ShadowNet  # noqa: E402
+from objectmorpher_research.training.shadows import samples, scenes, solids  # noqa: E402
+from objectmorpher_research.training.shadows.grounds import Grounds  # noqa: E402
+
+COUNT = 6
+
+
+@pytest.fixture(scope="module")
+def made() -> list[scenes.SceneGeometry]:
+    shapes = solids.silhouettes(8, 0)
+    return [scenes.make_geometry(np.random.default_rng(k), shapes) for k in range(COUNT)]
+
+
+@pytest.fixture(scope="module")
+def drawn(made) -> list[samples.ShadowSample]:
+    rng = np.random.default_rng(0)
+    grounds = Grounds(rng, 6)
+    return [samples.make_sample(rng, scene, made[k - 1], grounds) for k, scene in enumerate(made)]
+
+
+@pytest.mark.parametrize("kind", solids.ANY_SOLID)
+def test_a_ray_meets_a_solid_where_the_solid_is(kind):
+    """Where a ray is in the solid is asked of points along it, one by one."""
+    rng = np.random.default_rng(kind)
+    away = np.linspace(0, 8, 4001)
+    for _ in range(40):
+        parts = solids.Parts()
+        parts.add(kind, rng.normal(0, 0.3, 3), rng.uniform(0.2, 1, 3), solids.any_turn(rng, 1.0))
+        arrays = parts.arrays()
+        origin, way = np.array([0.0, 0.0, -4.0]), np.append(rng.normal(0, 0.1, 2), 1.0)
+        found = solids.hit(
+            kind, arrays.into[0], arrays.middle[0], np.ones((1, 1), bool), origin, way
+        )
+        x, y, z = ((origin + away[:, None] * way - arrays.middle[0]) @ arrays.into[0].T).T
+        wide = np.hypot(x, z)
+        inside = {
+            solids.ELLIPSOID: wide**2 + y**2 < 1,
+            solids.BOX: np.maximum(np.maximum(abs(x), abs(y)), abs(z)) < 1,
+            solids.CYLINDER: (wide < 1) & (abs(y) < 1),
+            solids.CONE: (wide < (1 - y) / 2) & (abs(y) < 1),
+        }[kind]
+        if not inside.any():
+            assert found > 8 or inside.sum() < 2
+            continue
+        assert abs(found - away[np.argmax(inside)]) < 0.005
+
+
+def test_a_thing_only_takes_light_and_only_beside_itself(made):
+    for scene in made:
+        light = scene.light
+        assert np.isfinite(light).all()
+        assert (light >= 0).all()
+        assert (light[..., 0] <= light[..., 1] + 1e-6).all()
+        mask = scene.what == scenes.THING_SEEN
+        rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+        longer = max(np.ptp(rows), np.ptp(columns)) + 1
+        assert abs(longer / scenes.FINE - THING / SIDE) < 0.06
+        middle = (rows[0] + rows[-1] + 1) / 2, (columns[0] + columns[-1] + 1) / 2
+        np.testing.assert_allclose(middle, scenes.FINE / 2, atol=0.05 * scenes.FINE)
+
+
+def test_scenes_are_kept(made):
+    for kept, scene in zip(scenes.unpacked(scenes.packed(made)), made, strict=True):
+        assert np.array_equal(kept.what, scene.what)
+        assert np.array_equal(kept.place, scene.place)
+        np.testing.assert_allclose(kept.light, scene.light, atol=2e-3)
+
+
+def test_what_should_be_found_is_on_the_ground_that_is_seen(drawn):
+    assert {True, False} == {bool(s.dark.any()) for s in drawn}
+    for sample in drawn:
+        assert sample.planes.shape == (PLANES, SIDE, SIDE)
+        assert np.isfinite(sample.planes).all()
+        assert not sample.weight[sample.planes[3] > 0.5].any()
+        if sample.label == 1:
+            shade = (sample.dark * sample.weight).sum()
+            assert shade > samples.DARK * samples.LARGE * 0.5 * sample.planes[3].sum()
+        if not sample.dark.any():
+            assert sample.label == 0
+
+
+def test_it_learns_and_runs_without_torch(drawn, tmp_path):
+    ring = train_shadow.SampleRing(len(drawn))
+    ring.add(*train_shadow.arrays_of(drawn))
+    plan = train_shadow.ShadowPlan(steps=60, size=4)
+    state = train_shadow.ShadowState(tmp_path / "shadow.pt", plan)
+    rng = np.random.default_rng(0)
+    before = state.learn(*ring.drawn(rng, 4))
+    for _ in range(40):
+        after = state.learn(*ring.drawn(rng, 4))
+    assert float(after.shade.detach()) < 0.7 * float(before.shade.detach())
+    state.save()
+    assert train_shadow.ShadowState(state.file, plan).step == state.step == 41
+    net, file = state.trained(), tmp_path / "shadow.onnx"
+    train_shadow.export(net, file)
+    planes = np.stack([s.planes for s in drawn[:1]])
+    found = open_session(file.read_bytes()).run(None, {"planes": planes})
+    with torch.no_grad():
+        wanted = net(torch.from_numpy(planes))
+    for one, other in zip(found, wanted, strict=True):
+        np.testing.assert_allclose(one, other.numpy(), atol=0.05)
+
+
+def test_samples_that_count_for_nothing_have_no_verdict():
+    net = ShadowNet().eval()
+    planes = torch.zeros(3, PLANES, SIDE, SIDE)
+    fields = torch.zeros(3, 2, SIDE, SIDE)
+    labels = torch.tensor([1.0, 0.0, float("nan")])
+    parts = train_shadow.losses(net, planes, fields, labels)
+    assert float(parts.shade.detach()) == 0
+    assert np.isfinite(float(parts.verdict.detach()))
