@@ -9,8 +9,8 @@ for where the object goes.
 A shadow begins where the object touches the ground, ends at an edge all around, takes light of
 all colours alike, is darker than what else is beside the object, and the photo is explained by it
 better than by none. Each of these is a number. A small network looks at the same surroundings
-(`shadow_look`): how sure it is of a shadow, and how far that lies where the fitted one does, are
-numbers, too. The weighted sum of all must exceed a margin. The weights are those of logistic
+(`shadow_look`): where it sees shade says which of the shadows that were tried it is, and how sure
+it is counts most. The weighted sum of all must exceed a margin. The weights are those of logistic
 regressions on half of the scenes of tests/shadow_scenes.py; docs/compositing shows how often it is
 right on the other half.
 """
@@ -74,10 +74,9 @@ WEIGHTS = {
     "gain": 2.62, "others": -1.47, "joined": 1.79, "whole": 1.97, "tint": -1.08, "behind": 2.77,
 }  # fmt: skip
 BIAS = -4.81
-# The joint weight of the sum of these, of the network's log odds, and of its agreement.
-JOINT = {"fit": 0.0, "odds": 0.0, "overlap": 0.0, "inside": 0.0}
-JOINT_BIAS = 0.0
-MOST_FIT = 8.0  # either way, that the sum counts
+# Of the sum of these, and of the network's log odds.
+JOINT, JOINT_BIAS = (0.3, 1.0), 0.0
+CERTAIN = 5.0  # of that sum, which is enough by itself: none of 437 scenes without a shadow has it
 SHADED = (0.05, 0.25)  # natural logarithm of light that was fitted, over which it becomes a shade
 MOST_TINT = 0.6  # x its darkness: what changes colours by more is another material
 SURE = 2.1  # margin: 11 of 295 scenes without a shadow that were held out have a higher score
@@ -144,29 +143,18 @@ def score(
     numbers = evidence(seen, ground, found)
     if numbers["tint"] > MOST_TINT:
         return -np.inf
-    joint = joint_evidence(seen, found, looked, numbers)
-    return sum(weight * joint[name] for name, weight in JOINT.items()) + JOINT_BIAS
-
-
-def joint_evidence(
-    seen: Surroundings, found: TriedShadow, looked: SeenShadow, numbers: dict[str, float]
-) -> dict[str, float]:
-    """Return the evidence by the names of JOINT, of that of WEIGHTS.
-
-    "overlap" is the intersection over union of the fitted shade and the network's, "inside" the
-    mean of the network's in the core of the fitted one.
-    """
     fit = sum(weight * numbers[name] for name, weight in WEIGHTS.items()) + BIAS
-    joint = {"fit": float(np.clip(fit, -MOST_FIT, MOST_FIT)), "odds": looked.odds}
-    thrown, free = fitted(seen, found), seen.free
-    if not free.any():
-        return joint | {"overlap": 0.0, "inside": 0.0}
+    joint = JOINT[0] * fit + JOINT[1] * looked.odds + JOINT_BIAS
+    return max(joint, SURE + fit - CERTAIN)
+
+
+def overlap(seen: Surroundings, found: TriedShadow, looked: SeenShadow) -> float:
+    """Return the intersection over union of the fitted shade and the one that the network sees."""
     low, high = SHADED
-    shade = np.clip((thrown - low) / (high - low), 0, 1)[free]
-    other, core = looked.shade[free], thrown[free] > 0.5 * thrown[free].max()
-    overlap = np.minimum(shade, other).sum() / max(float(np.maximum(shade, other).sum()), 1e-3)
-    inside = float(other[core].mean()) if core.any() else 0.0
-    return joint | {"overlap": float(overlap), "inside": inside}
+    shade = np.clip((fitted(seen, found) - low) / (high - low), 0, 1) * seen.free
+    other = looked.shade * seen.free
+    both, either = float(np.minimum(shade, other).sum()), float(np.maximum(shade, other).sum())
+    return both / max(either, 1e-3)
 
 
 def evidence(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> dict[str, float]:
@@ -259,7 +247,6 @@ FLAT_LENGTHS = (0.1, 0.25, 0.5)  # x the shorter side of what is seen from above
 FLAT_HEIGHT = 6.0  # x that side's share, of a shadow's length in the rim's heights
 LEAST_FLAT = 0.4  # of the loss without a shadow, that such a one must explain
 SOFTNESS = 0.35
-WEIGHED, APART = 4, 30.0  # shadows of which the likeliest is taken; degrees between them
 FINER = ((10.0, 1.3), (5.0, 1.15))  # degrees, and factor of the length
 SOFTER = 0.2
 CUT_OFF = 0.15  # x its width, along the photo's lower edge
@@ -296,7 +283,7 @@ def find_old_shadow(
         return None
     slope = float(np.sin(np.radians(SHEET_GROUND if seen_from is None else seen_from)))
     try:
-        seen = _look(pixels, matte, others, slope)
+        seen = surroundings(pixels, matte, others, slope)
     except ValueError:  # it is thinner than what is looked at
         return None
     looked = look_for_shadow(seen.brightness, seen.colour, seen.cover, seen.free)
@@ -345,7 +332,8 @@ def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
     return bool(solid[max(last - 1, 0) : last + 1].any(0).sum() > CUT_OFF * solid.any(0).sum())
 
 
-def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> Surroundings:
+def surroundings(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> Surroundings:
+    """Look around what was cut out. Raises ValueError where it is thinner than a cell."""
     height, width = pixels.shape[:2]
     rows, columns = (np.flatnonzero((matte.alpha > 0.5).any(axis)) for axis in (1, 0))
     size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
@@ -428,13 +416,13 @@ def _tried(seen: Surroundings, ground: ShadowGround, shadow: Shadow) -> TriedSha
 def _searched(
     seen: Surroundings, looked: SeenShadow, ground: ShadowGround, lengths: tuple[float, ...]
 ) -> TriedShadow | None:
-    """Of all directions and lengths what most speaks for, then the best that lies around it."""
+    """Of all directions and lengths what explains most where the network sees shade; then finer."""
     few = _thinned(ground, seen.cover.shape[1])
     tried = [_tried(seen, few, shadow) for shadow in _coarsely(lengths)]
-    gained = sorted((f for f in tried if f is not None), key=lambda f: -f.gain)
+    gained = [f for f in tried if f is not None]
     if not gained:
         return None
-    best = max(_distinct(gained), key=lambda f: score(seen, few, f, looked))
+    best = max(gained, key=lambda f: f.gain + overlap(seen, f, looked))
     for step, factor in FINER:
         for shadow in _around(best.shadow, step, factor):
             other = _tried(seen, few, shadow)
@@ -453,18 +441,6 @@ def _thinned(ground: ShadowGround, columns: int) -> ShadowGround:
     }
     few = replace(ground, **parts)
     return replace(few, loss=regressed(few.basis, few.brightness, few.weight)[1])
-
-
-def _distinct(gained: list[TriedShadow]) -> list[TriedShadow]:
-    """The first few of which no two go nearly the same way."""
-    kept: list[TriedShadow] = []
-    for found in gained:
-        turns = [abs((found.shadow.direction - k.shadow.direction + 180) % 360 - 180) for k in kept]
-        if all(turn > APART for turn in turns):
-            kept.append(found)
-        if len(kept) == WEIGHED:
-            break
-    return kept
 
 
 def _coarsely(lengths: tuple[float, ...]) -> Iterator[Shadow]:
