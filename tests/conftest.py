@@ -98,11 +98,11 @@ def lifted_once() -> Iterator[None]:
     """
     from objectmorpher_core.compose.plate import plate
     from objectmorpher_core.lift.relief.lifter import ReliefLifter
-    from objectmorpher_core.scripting import runner
+    from objectmorpher_core.scripting import background
 
     with pytest.MonkeyPatch.context() as patch:
         for owner, name in (
-            (ReliefLifter, "lift"), (plate, "find_residue"), (runner, "find_old_shadow"),
+            (ReliefLifter, "lift"), (plate, "find_residue"), (background, "find_old_shadow"),
         ):  # fmt: skip
             patch.setattr(owner, name, _remembering(getattr(owner, name)))
         yield
