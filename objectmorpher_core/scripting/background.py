@@ -59,7 +59,8 @@ class PlateTask:
         shadows = tuple(
             find_old_shadow(self.pixels, caster.matte, self.covered) for caster in self.casters
         )
-        gone = [s for s, c in zip(shadows, self.casters, strict=True) if s and c.has_gone]
+        found = zip(shadows, self.casters, strict=True)
+        gone = [s for s, caster in found if s is not None and caster.has_gone]
         inpainter = compose.load(self.inpaint)
         if gone:
             plate = traceless_plate(
