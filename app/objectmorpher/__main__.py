@@ -36,13 +36,13 @@ def _leave(code: int) -> None:
 
     Comes back where what was printed cannot be handed over, which the interpreter then reports.
     """
+    atexit._run_exitfuncs()
     try:
         for stream in (sys.stdout, sys.stderr):
             if stream is not None:
                 stream.flush()
     except (OSError, ValueError):
         return
-    atexit._run_exitfuncs()
     os._exit(code)
 
 
