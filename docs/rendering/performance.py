@@ -88,14 +88,14 @@ medians, old and new on the same machine on the same day:
 
 | What | Before | Now |
 |---|---:|---:|
-| `edit`, the whole process, alternating five times at load 2.5 (s) | 8.1 | 6.2 |
-| of it, by its own clock (s) | 6.2 | 4.7 |
-| of it, processor time (s) | 10.3 | 10.2 |
+| `edit`, the whole process, alternating four times at load 1 (s) | 7.2 | 6.1 |
+| of it, by its own clock (s) | 5.5 | 4.5 |
+| of it, processor time (s) | 9.9 | 10.0 |
 | again in the same process, four times at load 1.5 (s) | 4.9 | 2.4 |
 | of it, processor time (s) | 7.0 | 3.9 |
 | an edit of 24 MP, the most memory it used (MB) | 3,183 | 3,314 |
 
-The 5 s of a first edit are not reached: its processor time is the same, two cores need 5.1 s for it
+The 5 s of a first edit are not reached: its processor time is the same, two cores need 5.0 s for it
 at best, and imports (1.1 s), DINOv2 (2.6 s) and both looks of U²-Net-p (0.7 s each) are half of it.
 Outputs of twelve edits of six photos, with sessions, splats and plates, are the same bytes.
 """
