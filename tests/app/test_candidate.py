@@ -100,14 +100,16 @@ def test_what_a_correction_would_change_is_shown_and_is_what_it_changes(
     np.testing.assert_array_equal(editor.mask, shown.mask)
 
 
-def test_a_late_answer_is_shown_and_is_the_last(
+def test_late_answers_are_shown_and_the_second_is_the_last(
     editor: Editor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(candidate, "TOO_SLOW", 0.0)
     wait_for_jobs(editor)
+    for place in (CENTRE, (6.0, 4.0)):
+        rest_on(editor, *place)
+        editor.poll()
+        wait_until(editor, lambda: editor.candidates.shown is not None)
     rest_on(editor, *CENTRE)
-    wait_until(editor, lambda: editor.candidates.shown is not None)
-    rest_on(editor, 4.0, 4.0)
     editor.poll()
     assert editor.candidates.shown is None
     time.sleep(2 * candidate.REST)
