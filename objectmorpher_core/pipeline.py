@@ -7,6 +7,8 @@ as the command line does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -44,6 +46,7 @@ from .lift.relief.depth_look import look_at_all
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
 from .raster.posed import PosedSplats
 from .scripting import runner
+from .scripting.background import PlateAhead
 from .scripting.options import EditScript, ScriptError
 from .scripting.report import Stopwatch, build_report
 from .scripting.runner import RefineOptions, has_left, prompt_of, with_plate, with_refinement
@@ -107,14 +110,18 @@ def lift_mask(
     progress: Progress = silent,
     seed: int = 0,
     mixed: Mask | None = None,
+    use_matte: Callable[[Matte], object] | None = None,
 ) -> tuple[Matte, LiftedObject]:
     """The object under `mask` (H, W), bool or soft u8, as a cut-out and as 3D Gaussians.
 
     `mixed` (H, W): where the edge brush has found the softness of the mask, see `build_matte`.
+    `use_matte` gets the cut-out before it is lifted.
     """
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
     matte = cut_out(pixels, mask, mixed)
+    if use_matte is not None:
+        use_matte(matte)
     subject = lift.LiftSubject(pixels, camera, is_selected(mask), matte)
     return matte, lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
 
@@ -249,8 +256,23 @@ def continue_script(
     """
     runner.refuse_missing(script, others)
     refiner = runner.refiner_of(script, others)
-    stopwatch = stopwatch or Stopwatch()
-    run = _Run(document, stopwatch)
+    with closing(_Run(document, stopwatch or Stopwatch())) as run:
+        if others == ALONE and (needs_plate or runner.leaves_a_hole(script)):
+            run.begins_plate = not (script.front or script.front_mask)
+        return _carried_out(run, script, mask, progress, needs_plate, others, refiner)
+
+
+def _carried_out(
+    run: _Run,
+    script: EditScript,
+    mask: bytes | None,
+    progress: Progress,
+    needs_plate: bool,
+    others: Others,
+    refiner: str | None,
+) -> Edited:
+    """The rest of `continue_script`; the learned `refiner`, if any, refines it all."""
+    stopwatch = run.stopwatch
     wishes = runner.with_inherited((FurtherObject(script), *others.objects))
     for k, wanted in enumerate(wishes):
         step = part(progress, 0.6 * k / len(wishes), 0.6 * (k + 1) / len(wishes))
@@ -264,7 +286,7 @@ def continue_script(
     if any(item.is_moved for item in document.objects) or needs_plate or script.key:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)
-            behind = with_plate(document, script, frozenset(run.casting), step)
+            behind = with_plate(document, script, frozenset(run.casting), step, run.ahead)
             document, notes = behind.document, (*notes, *behind.notes)
     has_shadow = any(item.shadow.strength > 0 for item in document.objects)
     if has_shadow and document.depth is None and not script.no_depth:
@@ -292,7 +314,9 @@ class _Run:
         self.puppets: dict[int, Puppet] = {}
         self.energies: dict[int, tuple[float, ...]] = {}
         self.casting: set[int] = set()  # objects that take their shadow in the photo along
-        self._stopwatch = stopwatch
+        self.stopwatch = stopwatch
+        self.begins_plate = False  # as soon as the object that is lifted is cut out
+        self.ahead: PlateAhead | None = None  # that plate
         self._readings: dict[str, Reading] = {}  # by the segmenter's name
 
     def add(self, k: int, wanted: FurtherObject, mask: bytes | None, progress: Progress) -> None:
@@ -312,7 +336,7 @@ class _Run:
         puppet = self.puppets[k] = puppet_of(self.document.objects[k], self.document.photo.camera)
         step = part(progress, 0.8, 1.0)
         self.document, self.energies[k] = runner.posed(
-            self.document, k, puppet, script, step, self._stopwatch
+            self.document, k, puppet, script, step, self.stopwatch
         )
         if wanted.duplicate is None:
             self.document = runner.placed(self.document, k, script)
@@ -320,10 +344,20 @@ class _Run:
         if script.shadow == "auto" and has_left(self.document.objects[k]):
             self.casting.add(k)
 
+    def close(self) -> None:
+        """Ends what was begun and nobody wants any more."""
+        if self.ahead is not None:
+            self.ahead.drop()
+
     def lift(self, k: int, script: EditScript, progress: Progress) -> None:
         """Object `k`, which is chosen, in 3D."""
-        with self._stopwatch.stage("lift"):
-            document = _lift(self.document, k, script, progress)
+
+        def begin_plate(matte: Matte) -> None:
+            if self.begins_plate:
+                self.ahead = runner.begun_plate(self.document, k, matte, script)
+
+        with self.stopwatch.stage("lift"):
+            document = _lift(self.document, k, script, progress, begin_plate)
             if script.decontaminate > 0:
                 document = set_decontaminate(document, k, script.decontaminate)
             self.document = document
@@ -333,7 +367,7 @@ class _Run:
         prompt = prompt_of(script)
         if mask is None and prompt.is_empty:
             raise ScriptError("no object is chosen: use click, box, subject or mask")
-        with self._stopwatch.stage("segment"):
+        with self.stopwatch.stage("segment"):
             if mask is not None:
                 found, backend = read_mask(mask, self.document.photo.size), "mask"
             else:
@@ -394,8 +428,17 @@ class _Run:
         return self._readings[backend]
 
 
-def _lift(document: Document, k: int, script: EditScript, progress: Progress) -> Document:
-    """Object `k`, which is chosen, in 3D: lifted, or out of the script's file."""
+def _lift(
+    document: Document,
+    k: int,
+    script: EditScript,
+    progress: Progress,
+    use_matte: Callable[[Matte], object],
+) -> Document:
+    """Object `k`, which is chosen, in 3D: lifted, or out of the script's file.
+
+    `use_matte` gets its cut-out, where that is there before the shape is.
+    """
     photo, mask = document.photo, document.objects[k].selection
     assert mask is not None, "it was chosen"
     if script.splats is not None and script.more_views:
@@ -405,8 +448,9 @@ def _lift(document: Document, k: int, script: EditScript, progress: Progress) ->
         if script.more_views:
             return _lift_all_round(document, k, script, settings, progress)
         made = lift_mask(
-            photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed
-        )
+            photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed, None,
+            use_matte,
+        )  # fmt: skip
         return edits.set_lifted(document, k, *made, settings)
     is_free = script.fov is None and not photo.picture.focal_35mm
     scene = ImportTarget(photo.pixels, photo.camera, mask, is_free)

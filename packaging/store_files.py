@@ -1,10 +1,12 @@
-"""Manifests for winget and Homebrew, of installers that are built.
+"""Manifests for winget, Homebrew and Flatpak, of installers that are built.
 
     python packaging/store_files.py dist --address https://HOST/OWNER/NAME
 
-It writes three .yaml files (for a pull request to winget-pkgs) and `objectmorpher.rb` (a cask for a
-tap) into `dist`, with the hashes of the .msi and the .dmg files that are there. The address is the
-repository's, with assets at ADDRESS/releases/download/vVERSION/. Neither was submitted yet.
+It writes three .yaml files (for a pull request to winget-pkgs), `objectmorpher.rb` (a cask for a
+tap) and `org.objectmorpher.ObjectMorpher.yml` (for flatpak-builder, which unpacks the Debian
+package) into `dist`, with the hashes of the .msi, the .dmg files and the .deb that are there. The
+address is the repository's, with assets at ADDRESS/releases/download/vVERSION/. None was submitted
+yet, and flatpak-builder has not run.
 """
 
 from __future__ import annotations
@@ -84,6 +86,42 @@ cask "objectmorpher" do
   ]
 end
 """
+FLATPAK_ID = "org.objectmorpher.ObjectMorpher"
+FLATPAK = """\
+id: {id}
+runtime: org.freedesktop.Platform
+runtime-version: "24.08"
+sdk: org.freedesktop.Sdk
+command: objectmorpher
+finish-args:
+  - --share=ipc
+  - --share=network  # models and servers, if they are asked for
+  - --socket=x11
+  - --device=dri
+  - --filesystem=home
+modules:
+  - name: objectmorpher
+    buildsystem: simple
+    build-options:
+      strip: false
+      no-debuginfo: true
+    build-commands:
+      - ar x package.deb
+      - mkdir -p package /app
+      - tar --zstd -xf data.tar.zst -C package
+      - cp -a package/usr/. /app/
+    sources:
+      - type: file
+        url: {url}
+        sha256: {sha256}
+        dest-filename: package.deb
+"""
+
+
+def flatpak_manifest(package: Path, address: str, version: str) -> str:
+    """The manifest that unpacks a .deb."""
+    url = f"{address}/releases/download/v{version}/{package.name}"
+    return FLATPAK.format(id=FLATPAK_ID, url=url, sha256=sha256_of(package))
 
 
 def winget_files(msi: Path, address: str, project: dict[str, str]) -> dict[str, str]:
@@ -118,7 +156,7 @@ def sha256_of(path: Path) -> str:
 
 def main() -> int:
     """Write what the installers in a folder allow; the exit code."""
-    parser = argparse.ArgumentParser(description="Manifests for winget and Homebrew.")
+    parser = argparse.ArgumentParser(description="Manifests for winget, Homebrew and Flatpak.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--address", required=True, help="of the repository, without a slash")
     options = parser.parse_args()
@@ -129,6 +167,9 @@ def main() -> int:
             (options.folder / name).write_text(text, "utf-8")
     if images := sorted(options.folder.glob("*.dmg")):
         (options.folder / "objectmorpher.rb").write_text(cask(images, address, project), "utf-8")
+    for package in sorted(options.folder.glob("*.deb"))[:1]:
+        text = flatpak_manifest(package, address, project["version"])
+        (options.folder / f"{FLATPAK_ID}.yml").write_text(text, "utf-8")
     return 0
 
 

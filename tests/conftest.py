@@ -21,6 +21,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # those of PyTorch wait busily fo
 import numpy as np
 
 from objectmorpher_core.base.progress import silent
+from objectmorpher_core.models.early_answers import EarlyAnswers
+from objectmorpher_core.segment import dino_tokens, salience
 from tests import photos, remembered
 
 
@@ -48,6 +50,8 @@ def remembered_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 def afresh(monkeypatch: pytest.MonkeyPatch) -> None:
     """Networks run in this process whatever is remembered: for tests of them and of their time."""
     monkeypatch.delenv(remembered.FOLDER)
+    for module in (dino_tokens, salience):
+        monkeypatch.setattr(module, "_early", EarlyAnswers(module.KEPT))
 
 
 _known: dict[bytes, tuple[Any, ...]] = {}  # what `lifted_once` remembers: see `_remembering`
@@ -98,11 +102,11 @@ def lifted_once() -> Iterator[None]:
     """
     from objectmorpher_core.compose.plate import plate
     from objectmorpher_core.lift.relief.lifter import ReliefLifter
-    from objectmorpher_core.scripting import runner
+    from objectmorpher_core.scripting import background
 
     with pytest.MonkeyPatch.context() as patch:
         for owner, name in (
-            (ReliefLifter, "lift"), (plate, "find_residue"), (runner, "find_old_shadow"),
+            (ReliefLifter, "lift"), (plate, "find_residue"), (background, "find_old_shadow"),
         ):  # fmt: skip
             patch.setattr(owner, name, _remembering(getattr(owner, name)))
         yield

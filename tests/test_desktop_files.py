@@ -5,17 +5,22 @@ from __future__ import annotations
 import configparser
 import hashlib
 import re
+import runpy
+import shutil
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
+
 from objectmorpher import __version__
 from objectmorpher.editor.filing import PHOTO_ENDINGS, SESSION_ENDING
 
 ROOT = Path(__file__).parents[1]
 LINUX = ROOT / "packaging" / "linux"
+PACKAGES = ROOT / "packaging" / "linux_packages.py"
 ID = "org.objectmorpher.ObjectMorpher"
 SESSION_TYPE = "application/x-objectmorpher"
 NAMESPACE = "{http://www.freedesktop.org/standards/shared-mime-info}"
@@ -94,6 +99,46 @@ def test_the_manifests_of_winget_and_homebrew_hold_the_hashes_of_what_was_built(
     assert f'arm: "{hashes[names[1]]}"' in cask and f'intel: "{hashes[names[2]]}"' in cask
     assert 'arch arm: "arm64", intel: "x86_64"' in cask
     assert len(re.findall(r"\bdo$", cask, re.M)) == len(re.findall(r"^end$", cask, re.M)) == 1
+
+
+def test_the_flatpaks_manifest_unpacks_the_debian_package(tmp_path) -> None:
+    """Its commands lay out /app as the package lays out /usr; its parts have the menu's id."""
+    yaml = pytest.importorskip("yaml")
+    if any(shutil.which(tool) is None for tool in ("dpkg-deb", "ar", "zstd")):
+        pytest.skip("the tools that pack and unpack a Debian package are not there")
+    place_desktop_files = runpy.run_path(str(PACKAGES))["place_desktop_files"]
+    root, out = tmp_path / "root", tmp_path / "dist"
+    program = root / "usr/lib/objectmorpher/objectmorpher"
+    place_desktop_files(root / "usr/share")
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/bin/sh\n")
+    (root / "usr/bin").mkdir()
+    (root / "usr/bin/objectmorpher").symlink_to("../lib/objectmorpher/objectmorpher")
+    control = "Package: objectmorpher\nVersion: 9\nArchitecture: all\nMaintainer: us\n"
+    (root / "DEBIAN").mkdir()
+    (root / "DEBIAN/control").write_text(f"{control}Description: for the test\n")
+    out.mkdir()
+    package = out / "objectmorpher_9_all.deb"
+    pack = ["dpkg-deb", "--root-owner-group", "-Zzstd", "--build", root, package]
+    subprocess.run(pack, check=True, stdout=subprocess.DEVNULL)
+    command = [sys.executable, ROOT / "packaging" / "store_files.py", out, "--address"]
+    subprocess.run([*command, "https://example.org/us/it"], check=True)
+    (path,) = out.glob("*.yml")
+    manifest = yaml.safe_load(path.read_text("utf-8"))
+    assert path.stem == manifest["id"] == ID and manifest["command"] == "objectmorpher"
+    (module,) = manifest["modules"]
+    (source,) = module["sources"]
+    assert source["sha256"] == hashlib.sha256(package.read_bytes()).hexdigest()
+    release = f"https://example.org/us/it/releases/download/v{__version__}/"
+    assert source["url"] == release + package.name
+    app = tmp_path / "app"
+    shutil.copy(package, tmp_path / source["dest-filename"])
+    for line in module["build-commands"]:
+        line = re.sub(r"(?<= )/app\b", str(app), line)
+        subprocess.run(["sh", "-c", line], cwd=tmp_path, check=True)
+    assert (app / "bin/objectmorpher").read_text() == "#!/bin/sh\n"
+    for part in (f"applications/{ID}.desktop", f"metainfo/{ID}.metainfo.xml"):
+        assert (app / "share" / part).is_file(), part
 
 
 def test_the_workflows_run_what_there_is_on_three_systems() -> None:

@@ -108,11 +108,7 @@ def _turn_cup(guide: Guide) -> None:
     guide.place("Coffee")
     guide.point(guide.place("Coffee"))
     guide.shoot("Start", "The samples; the frame is the pointer's.")
-    guide.choose("Coffee")
-    guide.area("Drag a point on the object")  # a sample opens lifted: back to the photo
-    guide.press("ctrl+z")
-    guide.press("ctrl+z")
-    guide.choose("Tool: Select")
+    open_sample(guide, "Coffee")
     guide.point(EMPTY)
     guide.area("Photo")
     guide.shoot("Opened", "The same window in the light theme; what surrounds the photo stays a "
@@ -174,9 +170,9 @@ def _bend_rocket(guide: Guide) -> None:
     guide.place("Rocket")
     guide.point(guide.place("Rocket"))
     guide.shoot("Start", "At twice the scale text and lines are as large, and finer.")
-    guide.choose("Rocket")
-    guide.area("Photo")
+    open_sample(guide, "Rocket")
     guide.point(ABOVE)
+    guide.area("Photo")
     guide.shoot("Opened", "The photo, fitted.")
     guide.rest(320, 250)
     guide.shoot("Candidate", "What a click here would select.")
@@ -222,6 +218,15 @@ def _bend_rocket(guide: Guide) -> None:
     guide.area("Export rocket-edited.jpg")
     guide.shoot("Export", "What, how and where to.")
     export(guide, "rocket-edited.jpg", "The status line says what was written.", ABOVE)
+
+
+def open_sample(guide: Guide, name: str) -> None:
+    """Opens a sample, which is lifted at once, and goes back to its photo."""
+    guide.choose(name)
+    guide.area("Drag a point on the object")
+    guide.press("ctrl+z")
+    guide.press("ctrl+z")
+    guide.choose("Tool: Select")
 
 
 def pin(guide: Guide, *places: tuple[float, float]) -> None:

@@ -21,7 +21,9 @@ def make(docs: Path) -> None:
             "DISPLAY": display,
             "PYTHONPATH": f"{ROOT / 'app'}{os.pathsep}{ROOT}",
         }
-        environment["OBJECTMORPHER_SETTINGS"] = f"{folder}/settings.toml"
+        settings = Path(folder, "settings.toml")
+        settings.write_text('dismissed = ["posing"]\n', encoding="utf-8")
+        environment["OBJECTMORPHER_SETTINGS"] = str(settings)
         session = f"{folder}/edit.omorph"
         edit = ("-m", "objectmorpher", "edit", "--script", EDIT, "-o", f"{folder}/out.png")
         shots = ("tests/app/shoot_views.py", folder, session, "--montage", docs / "views.jpg")

@@ -31,6 +31,7 @@ AT_A_TIME = 3  # x the rows that are looked at around them: how many rows are bl
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
+Sums = tuple[float, float, float, float]  # from photo, lifter, inpainter, paint
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +41,14 @@ class Rows:
     left: int  # px, corner in the photo
     top: int
     colour: F32  # (h, w, 3) sRGB in [0, 1]
-    from_photo: F32  # shares of the colour; the three sum to 1
+    from_photo: F32  # shares of the colour; with that of paint they sum to 1
     from_lifter: F32
     from_inpainter: F32
     moved: F32  # px, see `displacement`
     is_covered: Mask  # by an object, now or before
     touched: F32 | None = None  # in [0, 1], what changes in place: shadows, repairs, colours
     is_object: Mask | None = None  # what objects alone cover, where more is covered; None: all is
+    from_paint: F32 | None = None  # None: nothing is painted
 
     @property
     def box(self) -> Box:
@@ -170,7 +172,7 @@ class Blend:
         self._rows: list[Rows] = []  # not blended yet, or needed by those that are not
         self._blended, self._bottom = box[1], box[3]  # px, rows of the photo
         self._least = rows or AT_A_TIME * self._reach
-        self._sums: list[tuple[float, float, float]] = []  # of shares over changed pixels
+        self._sums: list[Sums] = []  # of shares over changed pixels
         self.beside = 0  # px changed by shadows and repairs, out of the reach of every object
 
     def add(self, rows: Rows) -> None:
@@ -187,7 +189,7 @@ class Blend:
         away = distance(np.concatenate([r.is_covered for r in self._rows]))
         beside, top = self._beside(), self._rows[0].top
 
-        def mix(rows: Rows) -> tuple[float, float, float]:
+        def mix(rows: Rows) -> Sums:
             inner = slice(rows.top - top, rows.bottom - top)
             return self._mix(rows, weights[inner], away[inner] <= self._margin + 1)
 
@@ -208,7 +210,7 @@ class Blend:
         own = [r.is_covered if r.is_object is None else r.is_object for r in self._rows]
         return distance(np.concatenate(own)) > self._margin + 1
 
-    def _mix(self, rows: Rows, weights: F32, footprint: Mask) -> tuple[float, float, float]:
+    def _mix(self, rows: Rows, weights: F32, footprint: Mask) -> Sums:
         """Blends `rows` in by `weights` (h, w); the shares summed over the changed pixels."""
         x0, y0, x1, y1 = rows.box
         self.footprint[y0:y1, x0:x1] = footprint
@@ -216,7 +218,7 @@ class Blend:
             left, top = self._corner
             self.weights[y0 - top : y1 - top, x0 - left : x1 - left] = weights
         if not weights.any():
-            return 0.0, 0.0, 0.0
+            return 0.0, 0.0, 0.0, 0.0
         old = self._photo[y0:y1, x0:x1]
         photo = unit_pixels(old)
         mixed = photo + weights[..., None] * (rows.colour - photo)
@@ -233,10 +235,13 @@ class Blend:
             total(1 - shown + shown * rows.from_photo[changed]),
             total(shown * rows.from_lifter[changed]),
             total(shown * rows.from_inpainter[changed]),
+            0.0 if rows.from_paint is None else total(shown * rows.from_paint[changed]),
         )
 
-    def shares(self) -> tuple[float, float, float]:
-        """Return the shares of photo, lifter and inpainter in the changed pixels; else all 0."""
-        photo, lifter, inpainter = (math.fsum(sums) for sums in zip(*self._sums, strict=True))
-        whole = photo + lifter + inpainter or 1.0
-        return photo / whole, lifter / whole, inpainter / whole
+    def shares(self) -> Sums:
+        """The shares of photo, lifter, inpainter and paint in the changed pixels; else all 0."""
+        photo, lifter, inpainter, paint = (
+            math.fsum(sums) for sums in zip(*self._sums, strict=True)
+        )
+        whole = photo + lifter + inpainter + paint or 1.0
+        return photo / whole, lifter / whole, inpainter / whole, paint / whole

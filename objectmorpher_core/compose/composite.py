@@ -55,12 +55,13 @@ PIECE = 2 * TILE  # rows that a thread works on: what it computes stays in the p
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """Origins of the changed pixels; the four sum to 1 (or are 0 where nothing changed)."""
+    """Origins of the changed pixels; the five sum to 1 (or are 0 where nothing changed)."""
 
     from_photo: float = 0.0
     from_lifter: float = 0.0
     from_inpainter: float = 0.0
     from_refiner: float = 0.0
+    from_paint: float = 0.0  # by hand, on an object
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +131,8 @@ def composite(
     if document.refined is not None:
         pixels, share = with_refined(photo, pixels, document.refined)
     changed, outside = _count_changes(photo, pixels, footprint)
-    from_photo, from_lifter, from_inpainter = ((1 - share) * own for own in blend.shares())
-    shares = Shares(from_photo, from_lifter, from_inpainter, share)
+    from_photo, from_lifter, from_inpainter, paint = ((1 - share) * own for own in blend.shares())
+    shares = Shares(from_photo, from_lifter, from_inpainter, share, paint)
     weights = blend.weights
     return Composite(
         pixels, footprint, changed, outside, shares, camera, things, drawing.box, weights,
@@ -181,9 +182,9 @@ class _Drawing:
             if thing.item.is_moved and thing.item.is_visible and thing.splats is not None
         }
         self._paint = {
-            k: paint
+            k: (paint, paint.prepare(shown.splats, camera, camera))
             for k, shown in self._drawables.items()
-            if (paint := PaintedShare.of(shown.splats, things[k].matte, camera)) is not None
+            if (paint := PaintedShare.of(things[k].matte, shown.splats.rest.lifted)) is not None
         }
         self._textures = {
             k: object_texture(things[k].matte, things[k].item.lifted) for k in self._drawables
@@ -229,7 +230,7 @@ class _Drawing:
         for k, thing in enumerate(self._things):
             picture = self._draw(k, above, below)
             if picture is not None:
-                paint = self._paint[k].draw((x0, above, x1, below)) if k in self._paint else None
+                paint = self._draw_paint(k, (x0, above, x1, below))
                 rows = map_in_threads(partial(_with, thing, picture, above, paint), rows)
             elif not thing.item.is_moved:
                 rows = map_in_threads(partial(_at_rest, thing), rows)
@@ -247,6 +248,13 @@ class _Drawing:
                 own = np.dstack([picture.color, picture.alpha])
                 result = over(result, own, self._things[k].look.mode)
         return result
+
+    def _draw_paint(self, k: int, box: Box) -> F32 | None:
+        """How much of an object's picture in `box` is paint; None where nothing is painted."""
+        if k not in self._paint:
+            return None
+        paint, prepared = self._paint[k]
+        return np.float32(self._things[k].look.opacity) * paint.draw(prepared, box)
 
     def _draw(self, k: int, top: int, bottom: int) -> Picture3D | None:
         """The rows `top`..`bottom` of an object's picture; None where it is hidden, or at rest."""
@@ -354,6 +362,7 @@ def _at_rest(thing: Moved, rows: Rows) -> Rows:
         from_inpainter=through * rows.from_inpainter,
         moved=np.where(alpha >= OPAQUE, np.float32(0), rows.moved),
         touched=touched,
+        from_paint=None if rows.from_paint is None else through * rows.from_paint,
     )
 
 
@@ -373,7 +382,7 @@ def _with(thing: Moved, drawn: Picture3D, above: int, paint: F32 | None, rows: R
     if thing.item.is_visitor:  # nothing of it was ever there
         around = replace(around, shift=np.full_like(around.shift, ELSEWHERE))
     moved = displacement(around, rest)[inner]
-    if _is_only_painted(thing.item):  # whatever its shape says: there the photo shows it
+    if thing.item.is_only_painted:  # whatever its shape says: there the photo shows it
         moved = np.zeros_like(moved)
     picture = _part(around, inner.start, inner.stop)
     through = 1 - picture.alpha
@@ -382,27 +391,25 @@ def _with(thing: Moved, drawn: Picture3D, above: int, paint: F32 | None, rows: R
     if thing.item.finish != AS_IN_THE_PHOTO or thing.look.is_shaded:
         own = np.maximum(picture.alpha, rest[inner])
         touched = own if touched is None else np.maximum(touched, own)
-    from_photo = picture.from_photo
+    from_photo, from_lifter = picture.from_photo, picture.alpha - picture.from_photo
+    from_paint = None if rows.from_paint is None else through * rows.from_paint
     if paint is not None:
-        own = paint[y0 - above : y1 - above]
+        own = np.minimum(paint[y0 - above : y1 - above], picture.alpha)
         touched = own if touched is None else np.maximum(touched, own)
-        from_photo = from_photo * (1 - np.minimum(own / np.maximum(picture.alpha, 1e-6), 1))
+        bare = 1 - own / np.maximum(picture.alpha, 1e-6)
+        from_photo, from_lifter = bare * from_photo, bare * from_lifter
+        from_paint = own if from_paint is None else own + from_paint
     return replace(
         rows,
         colour=mixed(rows.colour, picture.color, picture.alpha, thing.look.mode),
         from_photo=from_photo + through * rows.from_photo,
-        from_lifter=picture.alpha - from_photo + through * rows.from_lifter,
+        from_lifter=from_lifter + through * rows.from_lifter,
         from_inpainter=through * rows.from_inpainter,
         moved=np.maximum(rows.moved, moved),
         is_covered=rows.is_covered | (rest[inner] > 0) | (picture.alpha > 0),
         touched=touched,
+        from_paint=from_paint,
     )
-
-
-def _is_only_painted(item: EditObject) -> bool:
-    """Whether it is where it was in the photo."""
-    is_there = item.pose is None and item.placement.is_identity and not item.is_visitor
-    return item.is_painted and is_there
 
 
 def _count_changes(photo: Pixels, pixels: Pixels, footprint: Mask) -> tuple[int, int]:

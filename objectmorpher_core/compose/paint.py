@@ -117,29 +117,33 @@ def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
 
 @dataclass(frozen=True, eq=False)
 class PaintedShare:
-    """The paint of an object as a picture of it shows it."""
+    """How much of what an object shows is paint: its alpha as a colour."""
 
-    drawable: tiles.Drawable
-    levels: TextureLevels  # its alpha as a colour
+    levels: TextureLevels
+    spots: F32  # (N, 3) of the Gaussians' plain colours
 
     @staticmethod
-    def of(splats: PosedSplats, matte: Matte, camera: Camera) -> PaintedShare | None:
-        """Of an object as `camera`, the photo's, sees it; None where none of it is painted."""
+    def of(matte: Matte, lifted: LiftedObject) -> PaintedShare | None:
+        """None where nothing of the object is painted."""
         if (paint := matte.paint) is None:
             return None
-        texture = object_texture(matte, splats.rest.lifted)
+        texture = object_texture(matte, lifted)
         height, width = texture.levels[0].shape[:2]
         left, top = int(texture.left), int(texture.top)
         alpha = unit_pixels(paint.crop((left, top, left + width, top + height))[..., 3:])
         levels = build_levels(np.repeat(alpha, 3, axis=2), texture.levels[0][..., 3], left, top)
-        spots = np.repeat(paint.spots[:, 3:] / np.float32(255), 3, axis=1)
-        if len(spots) == len(splats):  # else some were split, whose paint comes with the texture
-            splats = splats.recoloured(spots)
-        return PaintedShare(tiles.prepare(splats, camera, camera), levels)
+        spots: F32 = np.repeat(unit_pixels(paint.spots)[:, 3:], 3, axis=1)
+        return PaintedShare(levels, spots)
 
-    def draw(self, box: Box) -> F32:
+    def prepare(self, splats: PosedSplats, window: Camera, camera: Camera) -> tiles.Drawable:
+        """The object as `window` sees it, in its paint; `camera` is the photo's."""
+        is_whole = len(self.spots) == len(splats)  # else some were split, or drawn as fewer:
+        colours = self.spots if is_whole else np.zeros((len(splats), 3), np.float32)
+        return tiles.prepare(splats.recoloured(colours), window, camera)  # the texture's is left
+
+    def draw(self, prepared: tiles.Drawable, box: Box | None) -> F32:
         """(h, w) how much of each pixel is paint."""
-        return tiles.draw(self.drawable, self.levels, box).color[..., 0].copy()
+        return tiles.draw(prepared, self.levels, box).color[..., 0].copy()
 
 
 def _mixed(sums: F32, below: F32, opacity: float) -> F32:

@@ -422,6 +422,12 @@ class EditObject:
         return self.matte is not None and self.matte.paint is not None
 
     @property
+    def is_only_painted(self) -> bool:
+        """Whether it is painted, and where it was in the photo."""
+        is_there = self.pose is None and self.placement.is_identity and not self.is_visitor
+        return self.is_painted and is_there
+
+    @property
     def shown(self) -> LiftedObject | None:
         """Return its lift with the paint on its plain colours; for the rest see `Matte.shown`."""
         if self.lifted is None or self.matte is None or self.matte.paint is None:

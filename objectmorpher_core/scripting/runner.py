@@ -16,11 +16,9 @@ from ..base.progress import Progress, part, silent
 from ..compose import refine
 from ..compose.composite import composite, object_texture
 from ..compose.order import reordered
-from ..compose.plate.plate import build_plate, plate_cover
+from ..compose.plate.plate import plate_cover
 from ..compose.refine import refinement
 from ..compose.refine.refinement import CoarseEdit
-from ..compose.shadow.old_shadow import OldShadow, traceless_plate
-from ..compose.shadow.shadow_fit import find_old_shadow
 from ..deform.puppet import Puppet, puppet_of
 from ..document import edits
 from ..document.model import (
@@ -38,7 +36,8 @@ from ..document.placement import set_seen_from, spun
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
-from .options import FINISH, EditScript, ScriptError, options_of
+from .background import LIGHT, LIGHT_LIFTERS, PlateAhead, PlateTask, ShadowCaster
+from .options import FINISH, EditScript, ScriptError, options_of, said_by
 from .report import Stopwatch
 from .script import ALONE, FurtherObject, Others
 
@@ -317,38 +316,70 @@ def with_plate(
     script: EditScript,
     casting: frozenset[int],
     progress: Progress,
+    ahead: PlateAhead | None = None,
 ) -> LeftBehind:
     """The document with what is behind all its objects, filled in as the script's hints say.
 
-    Those of the numbers in `casting` take their own shadow along.
+    Those of the numbers in `casting` take their own shadow along. `ahead` may have begun it.
 
     An object that has left its place takes its shadow off the ground, where that is sure. It, and
     every copy of it that is elsewhere, throws one like it.
     """
     document = edits.set_hints(document, _hints(script, document.photo.size))
-    covered, pixels = plate_cover(document), document.photo.pixels
-    gone: list[OldShadow] = []
+    task = plate_task(document, script, casting)
+    found = task.run(progress) if ahead is None else ahead.answer(task, progress)
     notes: list[str] = []
-    for matte in _distinct(document, casting):
-        alike = [k for k in casting if document.objects[k].matte is matte]
-        old = find_old_shadow(pixels, matte, covered)
+    for caster, old in zip(task.casters, found.shadows, strict=True):
         if old is None:
             continue
+        alike = [k for k in casting if document.objects[k].matte is caster.matte]
         for k in alike:
             if document.objects[k].is_visible:
                 document = edits.set_shadow(document, k, old.shadow)
+        notes.append(_note(document.objects[alike[0]], caster.has_gone))
+    return LeftBehind(edits.set_plate(document, found.plate), tuple(notes))
+
+
+def plate_task(document: Document, script: EditScript, casting: frozenset[int]) -> PlateTask:
+    """What there is to be done for the plate of a document; see `with_plate`."""
+    casters = []
+    for matte in _distinct(document, casting):
         has_gone = not any(o.matte is matte and not has_left(o) for o in document.objects)
-        if has_gone:
-            gone.append(old)
-        notes.append(_note(document.objects[alike[0]], has_gone))
-    inpainter = compose.load(script.inpaint)
-    if gone:
-        plate = traceless_plate(
-            pixels, covered, gone, inpainter, progress, script.seed, document.hints
-        )
-    else:
-        plate = build_plate(pixels, covered, inpainter, progress, script.seed, document.hints)
-    return LeftBehind(edits.set_plate(document, plate), tuple(notes))
+        casters.append(ShadowCaster(matte, has_gone))
+    return PlateTask(
+        document.photo.pixels, plate_cover(document), tuple(casters), document.hints,
+        script.inpaint, script.seed,
+    )  # fmt: skip
+
+
+def begun_plate(
+    document: Document, k: int, matte: Matte, script: EditScript
+) -> PlateAhead | None:  # fmt: skip
+    """The plate of a document whose object `k` has just been cut out, and is still to be lifted.
+
+    None where that would need much memory beside the lift, or where nobody knows yet whether the
+    object will stand where its shadow is.
+    """
+    if script.lift not in LIGHT_LIFTERS or (script.spin and script.shadow == "auto"):
+        return None
+    try:
+        is_light = compose.load(script.inpaint).name in LIGHT
+    except ValueError:  # which is said when the plate's turn comes
+        return None
+    if not is_light:
+        return None
+    item = replace(document.objects[k], matte=matte, is_visible=not script.remove)
+    item = replace(item, placement=_placement(script))
+    document = edits.set_hints(document, _hints(script, document.photo.size))
+    document = document.with_object(k, item)
+    casts = script.shadow == "auto" and has_left(item)
+    return PlateAhead(plate_task(document, script, frozenset({k} if casts else ())))
+
+
+def leaves_a_hole(script: EditScript) -> bool:
+    """Whether an edit shows the background behind its object, as far as the script says."""
+    changed = said_by(script).keys() & ({"handle", "key", "spin", "remove"} | options_of(FINISH))
+    return bool(changed) or not _placement(script).is_identity
 
 
 def _note(item: EditObject, has_gone: bool) -> str:

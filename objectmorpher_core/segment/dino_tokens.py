@@ -25,6 +25,7 @@ TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the clas
 INNER = tuple(f"/backbone/encoder/layer.{k}/Add_1_output_0" for k in (5, 8))
 PATCH = 14  # px
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
+KEPT = 4  # of the last photos' tokens; each takes 3 MB
 SMALLEST_PATCH = 4  # px of the photo; finer ones would only see the enlargement's blur
 
 
@@ -81,7 +82,7 @@ def _reduced(rgb: RGB, patches: int) -> RGB:
     return np.asarray(cv2.resize(rgb, (w * PATCH, h * PATCH), interpolation=how), np.uint8)
 
 
-_early: EarlyAnswers[F32] = EarlyAnswers()
+_early = EarlyAnswers(KEPT)
 _opening = Lock()
 
 

@@ -47,13 +47,13 @@ class DinoWalk:
         if reason is not None:
             raise SelectionError(reason)
         progress(0.0, "recognising its parts")
+        rehearse()  # before the network is waited for, which others may run just now
         tokens = self._tokens(rgb, PATCHES, part(progress, 0.0, 0.75))
-        progress(0.75, "looking for the subject")
-        salience = self._subject.salience(rgb) if self._subject.missing() is None else None
-        progress(0.95, "cutting the photo into pieces")
+        progress(0.75, "cutting the photo into pieces")
         pieces = Pieces(rgb, tokens)
         pieces.rehearse()
-        rehearse()
+        progress(0.8, "looking for the subject")
+        salience = self._subject.salience(rgb) if self._subject.missing() is None else None
         progress(1.0, "read the photo")
         return Tokens(tokens, salience, pieces)
 

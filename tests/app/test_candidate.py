@@ -9,6 +9,7 @@ import pytest
 
 from editor_steps import CENTRE, wait_for_jobs, wait_until
 from objectmorpher.commands import run, take_next_step
+from objectmorpher.editor import candidate
 from objectmorpher.editor.candidate import CANDIDATE
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import SELECT
@@ -97,6 +98,23 @@ def test_what_a_correction_would_change_is_shown_and_is_what_it_changes(
     editor.selection.add_click(x, y, not takes_away)
     assert editor.mask is not before, "at once"
     np.testing.assert_array_equal(editor.mask, shown.mask)
+
+
+def test_late_answers_are_shown_and_the_second_is_the_last(
+    editor: Editor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(candidate, "TOO_SLOW", 0.0)
+    wait_for_jobs(editor)
+    for place in (CENTRE, (6.0, 4.0)):
+        rest_on(editor, *place)
+        editor.poll()
+        wait_until(editor, lambda: editor.candidates.shown is not None)
+    rest_on(editor, *CENTRE)
+    editor.poll()
+    assert editor.candidates.shown is None
+    time.sleep(2 * candidate.REST)
+    editor.poll()
+    assert not editor.candidates.is_due and not editor.jobs.is_busy(CANDIDATE)
 
 
 def test_a_pointer_that_leaves_leaves_no_candidate(editor: Editor) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
@@ -13,8 +16,11 @@ from objectmorpher.canvas.shares import count_changed
 from objectmorpher.canvas.shares import shares as shares_of
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Shown, ToolName, ViewState
+from objectmorpher_core.base.brush import Brush, Stroke
 from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose.paint import look, with_stroke
+from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.settings import Refined
@@ -154,6 +160,67 @@ def test_a_refinements_share_is_about_that_of_the_export(
         assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name
     parts = shares.from_photo + shares.from_lifter + shares.from_inpainter + shares.from_refiner
     assert parts == pytest.approx(1, abs=F32) and shares.from_refiner > strength / 2
+
+
+def painted_ball(ball: Document, place: Placement) -> tuple[Document, np.ndarray]:
+    """The ball with a stroke across what is seen of it in its place; (h, w) the stroke."""
+    document = edits.set_placement(ball, 0, place)
+    item, camera = document.objects[0], document.photo.camera
+    assert item.matte is not None
+    posed = puppet_of(item, camera).posed(item.pose, item.placement)
+    (x0, y0), (x1, y1) = np.percentile(camera.project(posed.means), (25, 75), axis=0)
+    stroke = Stroke(document.photo.size, Brush(12.0, 1.0))
+    stroke.move_to(float(x0), float(y0))
+    stroke.move_to(float(x1), float(y1))
+    assert stroke.box is not None
+    left, top, right, bottom = stroke.box
+    seen = look(posed, item.matte, camera, stroke.box)
+    coverage = stroke.coverage[top:bottom, left:right]
+    matte = with_stroke(item.matte, seen, coverage, np.array([0.1, 0.8, 0.2]))
+    return document.with_object(0, replace(item, matte=matte)), stroke.coverage
+
+
+PAINTED_AT = (Placement(), Placement(move=(25.0, 0.0), turn=(30.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("place", PAINTED_AT)
+def test_a_paints_share_is_about_that_of_the_export(
+    editor: Editor, ball: Document, place: Placement
+) -> None:
+    document, _ = painted_ball(ball, place)
+    shares, exact = shares_of(document, editor.cache), composite(document).shares
+    for name in ("from_photo", "from_lifter", "from_inpainter", "from_paint"):
+        assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name
+    assert exact.from_paint > 0.05
+
+
+@pytest.mark.parametrize("seconds", [60.0, 1e-9])
+@pytest.mark.parametrize("renderer", ["tiles", "gl"])
+def test_painted_pixels_are_marked_and_the_photos_own_are_not(
+    ball: Document, renderer: str, seconds: float
+) -> None:
+    """In the exact picture, and in the draft of a drag."""
+    plain = edits.set_placement(ball, 0, Placement(move=(25.0, 0.0)))
+    document, coverage = painted_ball(ball, Placement(move=(25.0, 0.0)))
+    width, height = document.photo.size
+    view, cache = ViewState(zoom=1.0, width=width, height=height), Cache()
+    cache.frame_time = seconds
+    marked, unmarked = (_invented(d, view, cache, renderer) for d in (document, plain))
+    assert marked[coverage >= 1].mean() > (230 if seconds > 1 else 128)  # px of a draft are 6 wide
+    assert unmarked[coverage >= 1].mean() < 25
+    far = cv2.dilate((coverage > 0).astype(np.uint8), np.ones((15, 15))) == 0
+    assert (marked[far] > 128).mean() < 0.05
+
+
+def _invented(document: Document, view: ViewState, cache: Cache, renderer: str) -> np.ndarray:
+    """(h, w) of the canvas, what of its object the view marks; 0 where it marks nothing."""
+    (own,) = build_frame(document, view, cache, Shown.PROVENANCE, renderer).objects
+    assert isinstance(own, FrameObject)
+    whole = np.zeros((view.height, view.width), np.uint8)
+    if own.layer is not None and own.layer.invented is not None:
+        x0, y0, x1, y1 = map(int, own.layer.box)
+        whole[y0:y1, x0:x1] = own.layer.invented
+    return whole
 
 
 def test_the_number_of_changed_pixels_is_about_that_of_the_export(

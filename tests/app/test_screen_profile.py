@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import os
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.settings import AS_THEY_ARE, AUTO, Settings
 from objectmorpher.system.desktop import read_profile, system_profile
 from objectmorpher_core.document.model import Document
-from objectmorpher_core.pictures.screen_colours import GRID
+from objectmorpher_core.pictures.screen_colours import GRID, profile_name, screen_table
 
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 REPLACE, BYTES = 0, 8
@@ -88,6 +89,33 @@ def test_a_file_can_be_chosen_and_what_is_none_is_one_sentence(
     good.unlink()
     assert read_profile(good) is None
     editor.settings = replace(editor.settings, screen_profile=AUTO)
+
+
+def profiles_of_inks() -> list[Path]:
+    """Those of four inks that the system has; in Debian they come with `libgs-common`."""
+    folders = os.environ.get("XDG_DATA_DIRS") or "/usr/local/share:/usr/share"
+    found = [p for folder in folders.split(":") for p in Path(folder, "color/icc").rglob("*.icc")]
+    return sorted(path for path in found if path.read_bytes()[16:20] == b"CMYK")
+
+
+def test_a_proof_by_inks_shows_no_colour_that_they_cannot_print() -> None:
+    inks = profiles_of_inks()
+    if not inks:
+        pytest.skip("the system has no profile of inks")
+    for path in inks:
+        profile = path.read_bytes()
+        assert profile_name(profile) is None and profile_name(profile, is_proof=True), path.name
+        table = screen_table(None, None, profile)
+        assert table is not None, path.name
+        levels = np.arange(GRID)
+        greys = table[levels, levels, levels].astype(int)
+        assert np.ptp(greys, axis=1).max() <= 24 and (np.diff(greys.sum(1)) >= -3).all()
+        assert greys[-1].min() > 240 and greys[0].max() < 60
+        again = screen_table(None, None, profile)
+        assert again is not None and np.array_equal(again, table)
+    press = [screen_table(None, None, p.read_bytes()) for p in inks if p.stat().st_size > 100_000]
+    for table in press:  # measured ones: the blue of a screen is beyond every press
+        assert table is not None and table[-1, 0, 0, 2] < 200
 
 
 def test_a_proof_shows_what_another_device_can_show(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hands import Hands, opened, window_environment, x_display
+from objectmorpher.editor.view import PoseMode
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import save_session
@@ -50,6 +51,22 @@ def test_a_small_screen_holds_the_window(compiled: None, ball: Document, tmp_pat
         assert "edited" not in hands.title()
         hands.choose(PANEL)
         hands.area("row of Object 1")
+        hands.press("3")
+        assert unnamed_ways(hands) == []
+
+
+def unnamed_ways(hands: Hands) -> list[str]:
+    """The ways to pose below whose icons nothing is written."""
+    places = [hands.area(mode.value) for mode in PoseMode]
+    picture = hands.settle()
+    found = []
+    for mode, place in zip(PoseMode, places, strict=True):
+        x0, y0, x1, y1 = map(round, place)
+        below = picture[y0 + 3 * (y1 - y0) // 5 : y1 - 3, x0 + 3 : x1 - 3].mean(2)
+        columns = np.abs(below - np.median(below)).max(0) > 40
+        if columns.sum() < 10:  # px: less than two letters
+            found.append(mode.value)
+    return found
 
 
 @pytest.mark.parametrize("down", [-20.0, 30.0])

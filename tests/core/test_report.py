@@ -27,7 +27,7 @@ KEYS = {
     "handles": None,
     "energy": {"start", "end", "iterations"},
     "pixels": {"changed", "outside_footprint_changed", "from_photo", "from_lifter",
-               "from_inpainter", "from_refiner", "shadow"},
+               "from_inpainter", "from_refiner", "from_paint", "shadow"},
     "backends": {"segment", "lift", "inpaint", "refine"},
     "seconds": {"load", "segment", "lift", "graph", "deform", "inpaint", "render", "refine",
                 "save", "total"},

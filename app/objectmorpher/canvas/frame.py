@@ -90,7 +90,8 @@ def build_frame(
 ) -> Frame:  # fmt: skip
     """Compute all that the canvas shows of a document.
 
-    `renderer`: "tiles" draws the objects here, "gl" leaves that to the GPU.
+    `renderer`: "tiles" draws the objects here, "gl" leaves that to the GPU, which does not know
+    what of an object is paint: where paint is marked, it is drawn here, too.
     """
     there: dict[int, PosedObject] = {}
 
@@ -112,8 +113,7 @@ def build_frame(
         for part in parts
     )
     objects = tuple(own for own in objects if own is not None)
-    if renderer == "tiles":
-        objects = _drawn(document, objects, view, cache)
+    objects = _drawn(document, objects, view, cache, renderer)
     if shown in BARE:
         return Frame(objects)
     shades = cache.lights.layers(lit, view)
@@ -195,9 +195,17 @@ def _drawn(
     objects: tuple[FrameObject | CanvasLayer, ...],
     view: ViewState,
     cache: Cache,
+    renderer: str,
 ) -> tuple[FrameObject | CanvasLayer, ...]:
-    """The objects with their pictures, in the time that a frame has."""
-    missing = [own for own in objects if isinstance(own, FrameObject)]
+    """The objects with the pictures that are drawn here, in the time that a frame has."""
+    missing = [
+        own
+        for own in objects
+        if isinstance(own, FrameObject)
+        if renderer == "tiles" or (own.part.is_marked and own.shape.paint is not None)
+    ]
+    if not missing:
+        return objects
     layers = cache.layers.draw(missing, document.photo.camera, view, cache.frame_time)
     return tuple(
         own if isinstance(own, CanvasLayer) else replace(own, layer=layers.get(own.part))

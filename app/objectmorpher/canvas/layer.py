@@ -17,6 +17,7 @@ from .shape import CanvasShape
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
+    from objectmorpher_core.compose.paint import PaintedShare
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.texture import TextureLevels
 
@@ -30,7 +31,8 @@ class CanvasLayer:
 
     box: tuple[float, float, float, float]  # x0, y0, x1, y1 canvas px
     rgba: np.ndarray  # (h, w, 4) premultiplied sRGB, f32 in [0, 1] or u8
-    invented: np.ndarray | None = None  # (h, w) u8, what of alpha is not the photo's: hatched
+    # (h, w) u8, what of alpha is not the photo's but invented or painted: hatched
+    invented: np.ndarray | None = None
     is_coarse: bool = False  # with fewer px than its box; else px for px
     is_draft: bool = False  # to be replaced by the exact picture
     is_tint: bool = False  # lies over everything, translucent
@@ -61,6 +63,7 @@ class ExactPicture:
     window: Camera
     camera: Camera  # the photo's
     part: ObjectPart
+    paint: PaintedShare | None = None  # on a part that is marked
 
 
 @dataclass(frozen=True)

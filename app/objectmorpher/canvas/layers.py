@@ -13,8 +13,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
+from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.base.camera import Camera
 
 from ..editor.view import Shown, ViewState
@@ -116,7 +118,8 @@ class Layers:
         x0, y0, x1, y1 = layer.box
         box = (int(x0), int(y0), int(x1), int(y1))
         window = view.camera(camera, box)
-        request = ExactPicture(own.splats, own.shape.texture, window, camera, own.part)
+        paint = own.shape.paint if own.part.is_marked else None
+        request = ExactPicture(own.splats, own.shape.texture, window, camera, own.part, paint)
         self._works[own.part] = _Work(
             own.posed, own.splats, view.place, request, box, layer, time.monotonic()
         )
@@ -153,14 +156,18 @@ class Layers:
         if box is None:
             return None
         pixels, sharpened = (box[2] - box[0]) * (box[3] - box[1]), 0.0
+        painted = None
+        if part.is_marked and (paint := own.shape.paint) is not None:
+            window = _coarser(view.camera(camera), factor)
+            painted = paint.draw(paint.prepare(drawable.splats, window, camera), box)
         if factor == 1:
-            layer = _layer(box, _rendered(drawable, texture, part, box), part)
+            layer = _layer(box, _rendered(drawable, texture, part, box, painted), part)
         elif part.is_painted:
             layer = _coarse_layer(drawable, texture, part, box, factor)
         else:
             picture = tiles.draw(drawable, texture, box)
             drawn = time.perf_counter()
-            layer = _sharp_layer(picture, texture, part, box, factor, view)
+            layer = _sharp_layer(picture, texture, part, box, factor, view, painted)
             sharpened = time.perf_counter() - drawn
             self._sharpening = _mean_rate(self._sharpening, sharpened, factor**2 * pixels)
         seconds = time.perf_counter() - start - sharpened
@@ -191,7 +198,11 @@ def _mean_rate(before: float, seconds: float, pixels: float) -> float:
 def render(request: ExactPicture) -> Rendered:
     """The exact picture."""
     drawable = _prepare(request.splats, request.window, request.camera)
-    return _rendered(drawable, request.texture, request.part)
+    painted = None
+    if (paint := request.paint) is not None:
+        prepared = paint.prepare(request.splats, request.window, request.camera)
+        painted = paint.draw(prepared, None)
+    return _rendered(drawable, request.texture, request.part, painted=painted)
 
 
 def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
@@ -201,16 +212,23 @@ def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawa
 
 
 def _rendered(
-    drawable: Drawable, texture: TextureLevels, part: ObjectPart, box: Box | None = None
+    drawable: Drawable,
+    texture: TextureLevels,
+    part: ObjectPart,
+    box: Box | None = None,
+    painted: F32 | None = None,
 ) -> Rendered:
-    """All of the view or the part `box` of it."""
+    """All of the view or the part `box` of it; `painted` (h, w) is how much of that is paint."""
     from objectmorpher_core.raster import tiles
 
     if not part.is_marked:
         return Rendered(tiles.draw_rgba(drawable, texture, box))
     picture = tiles.draw(drawable, texture, box)
     rgba = np.dstack([picture.color, picture.alpha])
-    return Rendered(as_u8(rgba), as_u8(picture.alpha - picture.from_photo))
+    from_photo = picture.from_photo
+    if painted is not None:
+        from_photo = from_photo * (1 - np.minimum(painted / np.maximum(picture.alpha, 1e-6), 1))
+    return Rendered(as_u8(rgba), as_u8(picture.alpha - from_photo))
 
 
 def _layer(box: Box, rendered: Rendered, part: ObjectPart) -> CanvasLayer:
@@ -236,8 +254,9 @@ def _sharp_layer(
     box: Box,
     factor: int,
     view: ViewState,
+    painted: F32 | None,
 ) -> CanvasLayer:
-    """An object that shows the photo, see `sharpening`; `box` as above."""
+    """An object that shows the photo, see `sharpening`; `box` as above, `painted` of it."""
     from objectmorpher_core.raster.sharpening import sharpen
 
     x0, y0, x1, y1 = (factor * v for v in box)
@@ -246,6 +265,9 @@ def _sharp_layer(
     rgba, invented = sharpen(
         picture, texture, factor, covered, corner, view.zoom, is_marked=part.is_marked
     )
+    if painted is not None and invented is not None:
+        wide = cv2.resize(painted, None, fx=factor, fy=factor)[: len(rgba), : rgba.shape[1]]
+        invented = np.maximum(invented, np.minimum(as_u8(wide), rgba[..., 3]))
     return CanvasLayer(_floats(covered), rgba, invented, is_draft=True)
 
 

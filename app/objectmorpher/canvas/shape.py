@@ -27,6 +27,7 @@ from .memo import Memo
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
+    from objectmorpher_core.compose.paint import PaintedShare
     from objectmorpher_core.deform.puppet import Puppet
     from objectmorpher_core.raster.texture import TextureLevels
 
@@ -59,6 +60,13 @@ class CanvasShape:
     @cached_property
     def surface(self) -> RestSurface:
         return build_surface(self.puppet.lifted)
+
+    @cached_property
+    def paint(self) -> PaintedShare | None:
+        """Where the artist has painted the object."""
+        from objectmorpher_core.compose.paint import PaintedShare
+
+        return PaintedShare.of(self.matte, self.puppet.lifted)
 
     def changed_to(self, thing: EditObject) -> CanvasShape:
         """Return the same object with another rig or matte; what does not depend on it is kept."""

@@ -8,12 +8,13 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document
 
 from ..editor.view import ViewState
 from .blend import CELL
 from .frame import Cache, Frame, build_frame
-from .layer import CanvasLayer
+from .layer import CanvasLayer, FrameObject
 
 SMALL = 320  # px, longer side of the picture on which shares are counted
 LEAST = 0.02  # of a pixel that something new covers: with less it counts as unchanged
@@ -27,6 +28,7 @@ class CanvasShares:
     from_lifter: float = 0.0
     from_inpainter: float = 0.0
     from_refiner: float = 0.0
+    from_paint: float = 0.0
     changed: float = 0.0  # of all pixels of the photo
 
 
@@ -57,17 +59,19 @@ def _count(document: Document, cache: Cache) -> CanvasShares:
     inpainted = np.zeros(size[::-1], np.float32)
     if hole is not None:
         cv2.resize(hole.astype(np.float32), size, inpainted, interpolation=cv2.INTER_AREA)
-    lifted, inpainted, through = _through_objects(document, frame, view, inpainted)
+    seen = _through_objects(document, frame, view, inpainted)
+    through = seen.unchanged
     is_changed = (edited > 0) & (through < 1 - LEAST)
     if not is_changed.any():
         return CanvasShares()
-    by_lifter = float((lifted * edited)[is_changed].mean())
-    by_inpainter = float((inpainted * edited)[is_changed].mean())
+    parts = (seen.lifted, seen.inpainted, seen.painted)
+    by_lifter, by_inpainter, by_paint = (float((p * edited)[is_changed].mean()) for p in parts)
     by_refiner = float(_alpha(frame.refined, view)[is_changed].mean())
     rest = 1 - by_refiner  # as the composite's figures: a refinement lies over all the others
-    by_lifter, by_inpainter = rest * by_lifter, rest * by_inpainter
-    from_photo = rest - by_lifter - by_inpainter
-    return CanvasShares(from_photo, by_lifter, by_inpainter, by_refiner, float(is_changed.mean()))
+    by_lifter, by_inpainter, by_paint = rest * by_lifter, rest * by_inpainter, rest * by_paint
+    from_photo = rest - by_lifter - by_inpainter - by_paint
+    changed = float(is_changed.mean())
+    return CanvasShares(from_photo, by_lifter, by_inpainter, by_refiner, by_paint, changed)
 
 
 def _small_view(document: Document) -> ViewState:
@@ -77,24 +81,51 @@ def _small_view(document: Document) -> ViewState:
     return view
 
 
-def _through_objects(
-    document: Document, frame: Frame, view: ViewState, inpainted: F32
-) -> tuple[F32, F32, F32]:
-    """What each pixel shows of what a lifter invented, of `inpainted`, and of what is unchanged."""
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What each pixel (h, w) shows of each origin."""
+
+    lifted: F32
+    inpainted: F32
+    painted: F32
+    unchanged: F32
+
+
+def _through_objects(document: Document, frame: Frame, view: ViewState, inpainted: F32) -> _Seen:
+    """What is seen of the origins, of which `inpainted` (h, w) lies behind the objects."""
     from objectmorpher_core.raster import tiles
 
     camera = document.photo.camera
-    lifted, through_all = np.zeros_like(inpainted), 1 - inpainted
+    lifted, painted = np.zeros_like(inpainted), np.zeros_like(inpainted)
+    unchanged = 1 - inpainted
     for own in frame.objects:
+        still, paint = np.float32(0), None  # what of the object is where and as it was
         if isinstance(own, CanvasLayer):
             through, invented = 1 - _alpha((own,), view), np.float32(0)
         else:
             picture = tiles.render(own.draft, own.shape.texture, view.camera(camera), camera)
             through = 1 - np.minimum(picture.alpha, 1)
             invented = np.maximum(picture.alpha - picture.from_photo, 0)
+            paint = _paint_on(own, view.camera(camera), camera)
+            if paint is not None:
+                alpha = np.maximum(picture.alpha, np.float32(1e-6))
+                paint = np.minimum(paint, picture.alpha)
+                invented = invented * (1 - paint / alpha)
+                if own.item.is_only_painted:
+                    still = np.minimum(picture.alpha, 1) - paint
         lifted = through * lifted + invented
-        inpainted, through_all = through * inpainted, through * through_all
-    return lifted, inpainted, through_all
+        painted = through * painted
+        if paint is not None:
+            painted = painted + paint
+        inpainted, unchanged = through * inpainted, still + through * unchanged
+    return _Seen(lifted, inpainted, painted, unchanged)
+
+
+def _paint_on(own: FrameObject, window: Camera, camera: Camera) -> F32 | None:
+    """How much of an object's picture is paint; None where nothing is painted."""
+    if (paint := own.shape.paint) is None:
+        return None
+    return paint.draw(paint.prepare(own.posed, window, camera), None)
 
 
 def _alpha(layers: tuple[CanvasLayer, ...], view: ViewState) -> F32:

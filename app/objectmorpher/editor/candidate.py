@@ -37,7 +37,7 @@ CANDIDATE = "candidate"  # kind of job
 CLOSER = "closer candidate"  # kind of job, of one that is shown
 REST = 0.06  # s that the pointer rests before the worker is asked
 SAME_PLACE = 2.0  # points: a hand moves so much when it presses
-TOO_SLOW = 2.5  # s; after such an answer the photo is not asked about again
+TOO_SLOW = 2.5  # s; after two such answers, which are shown, the photo is not asked about again
 
 Answered = Callable[[Question, Found, Prompt], None]
 Improved = Callable[[Question, Selection | None, Found], None]
@@ -87,6 +87,7 @@ class Candidates:
         self._asked: Prompt | None = None  # the last one
         self._wanted: Question | None = None  # the user clicked while it was being answered
         self._slow: Photo | None = None
+        self._late: Photo | None = None  # one answer was late: the first waits for the networks
 
     @property
     def is_due(self) -> bool:
@@ -140,16 +141,15 @@ class Candidates:
         return (
             (self._tasks.is_click_awaited or self._tasks.is_correction_awaited)
             and editor.document is not None
-            and editor.document.photo is not self._slow
             and editor.hover.place is not None
             and not editor.hand.is_busy
         )
 
     def _next_prompt(self) -> Prompt | None:
         """What a click would say now, where that was not asked yet."""
-        if self._place is None:
-            return None
         editor, mask = self._editor, self._editor.mask
+        if self._place is None or editor.document is None or editor.document.photo is self._slow:
+            return None
         if mask is None:
             prompt = Prompt((Click(*self._place),), level=editor.view.selecting.level)
         else:  # a click where the mask is right says nothing new
@@ -178,7 +178,8 @@ class Candidates:
         def accept(answer: Found | str) -> None:
             wanted = self._pop_wanted()
             if time.monotonic() - now > TOO_SLOW:
-                self._slow = photo
+                self._slow = photo if self._late is photo else self._slow
+                self._late = photo
             current = editor.document
             if current is None or current.photo is not photo:
                 return

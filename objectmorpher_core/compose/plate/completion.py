@@ -18,6 +18,7 @@ import numpy as np
 
 from ...base.arrays import F32, I32, Mask, frozen
 from ...base.progress import Progress
+from ...base.threads import in_threads
 from . import patch_search
 from .sources import Guide, guidance
 
@@ -42,6 +43,7 @@ ROUGHNESS_WEIGHT = 8.0  # x a colour channel's
 TONE_WEIGHT = 0.4  # x a colour channel's, of each of a tone's
 HOLE_WEIGHT = 0.4  # x a known pixel's, of one that is only guessed, when patches are compared
 TRUST = 1.3  # x less a patch's vote counts for each px that it lies deeper in the hole
+VOTED_PARTS, VOTED_ROWS = 4, 16  # of the rows that vote: how many a core, and what one is worth
 LEAST_TRUST = np.float32(1e-30)  # deep in a hole; less would be no whole float32 any more
 USUAL_COST = 75  # percentile of the patches' costs, at which a vote loses
 LEAST_SHARE = 1e-12
@@ -274,7 +276,12 @@ class _Filling:
     def _let_vote(self, shares: F32) -> None:
         values, shares = self.values.copy(), frozen(shares, np.float32)
         layers, sources = frozen(self._layers[..., : values.shape[2]]), frozen(self.sources)
-        patch_search.vote(layers, sources, shares, frozen(self.hole), values)
+        hole = frozen(self.hole)
+
+        def vote(first: int, last: int) -> None:
+            patch_search.vote(layers, sources, shares, hole, values, first, last)
+
+        in_threads(vote, len(hole), VOTED_PARTS, VOTED_ROWS)
         self.values = values
 
     def _follow_guidance(self) -> None:

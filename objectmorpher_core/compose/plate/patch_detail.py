@@ -8,13 +8,17 @@ place's detail in the photo on top of the small result's colours:
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ...base.arrays import F32, I32, Mask, Pixels, frozen
 from ...base.kernel_files import numba
+from ...base.threads import in_threads
 from ...pictures.image import resized
 
 LOW_PASS = 2  # small pixels: what is coarser comes from the search, what is finer from the photo
+PARTS, LEAST_ROWS = 4, 32  # of the photo's rows: how many a core, and what one is worth waking
 BLEND_STEEPNESS = 2.0  # x, of the blend between two sources' detail
 
 
@@ -32,13 +36,13 @@ def with_detail(
     filled = crop.copy()
     rough = resized(small, *size) * unit
     seen = frozen(crop), frozen(hole), frozen(rough, np.float32), frozen(sources)
-    _copy_detail(*seen, filled)
+    in_threads(partial(_copy_detail, *seen, filled), len(crop), PARTS, LEAST_ROWS)
     return filled
 
 
 @numba.njit(cache=True, nogil=True)
-def _copy_detail(crop, hole, rough, sources, filled):
-    """Fills `filled` (H, W, 3) in its hole: low + the detail of each pixel's source.
+def _copy_detail(crop, hole, rough, sources, filled, first, last):
+    """Fills the rows first..last of `filled` (H, W, 3) in its hole: low + the source's detail.
 
     A pixel between four pixels of the small picture mixes their four sources, mostly the nearest:
     the seam between two sources is a narrow blend.
@@ -47,7 +51,7 @@ def _copy_detail(crop, hole, rough, sources, filled):
     zoom = height / sources.shape[0], width / sources.shape[1]
     top = 65535.0 if crop.itemsize == 2 else 255.0
     shares, places = np.empty(4), np.empty((4, 2), np.int64)
-    for y in range(height):
+    for y in range(first, last):
         for x in range(width):
             if not hole[y, x]:
                 continue

@@ -137,8 +137,8 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, r
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def vote(layers, sources, shares, hole, voted):
-    """Set each pixel of the `hole` (h, w) to the mean of the patches over it.
+def vote(layers, sources, shares, hole, voted, first, last):
+    """Set each pixel of the `hole` (h, w) to the mean of the patches over it, in rows first..last.
 
     `voted` (h, w, C) is changed in place; the patch at (i, j) weighs `shares` (h, w).
     """
@@ -146,7 +146,7 @@ def vote(layers, sources, shares, hole, voted):
     size = layers.shape[1] - height + 1
     radius = size // 2
     mean = np.empty(voted.shape[2], np.float32)
-    for row in range(height):
+    for row in range(first, last):
         for column in range(width):
             if not hole[row, column]:
                 continue

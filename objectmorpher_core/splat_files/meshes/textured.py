@@ -1,7 +1,8 @@
 """Meshes out: a glTF file (.glb) of an object, with the photo on what the photo shows of it.
 
 The photo's light is in its colours already, so that the material is unlit (KHR_materials_unlit).
-What the photo does not show has colours at its vertices.
+The invented sides lie in the same picture, beside the photo's part, and paint lies over both. What
+neither shows has colours at its vertices.
 
 Its triangles are the surface that the Gaussians lie on. The signed distance to their planes,
 blended by nearness (implicit moving least squares, Kolluri 2008), is sampled on a grid near them;
@@ -18,10 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...base.arrays import F64, I64
+from ...base.arrays import F64, I64, Mask
+from ...compose.light.lighting import object_texture
 from ...deform.puppet import Puppet
 from ...document.gaussians import Gaussians
-from ...document.model import EditObject, Matte
+from ...document.model import EditObject, LiftedObject
+from ...document.sides import Sides
 from ...pictures.image import Picture, at_most, encode_picture, to_u8
 from ..limits import SplatFileError
 from ..splats.objects import facing_outwards, thinnest_last
@@ -170,6 +173,8 @@ def _used(vertices: F64, triangles: I64) -> tuple[F64, I64]:
 
 
 SEEN = 0.5  # visibility in the photo from which a triangle shows it
+STRETCHED = 0.4  # cosine to the photo's line of sight: with less, a side's picture shows it better
+APART = 2.0  # px of a side's picture: where neighbouring vertices see it alike, they agree by this
 TEXTURE_SIDE = 4096  # px, which every viewer can hold
 NEAREST = 6  # Gaussians of which a vertex has its colour
 FLOAT, UINT = 5126, 5125  # of glTF's accessors
@@ -212,14 +217,83 @@ def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
     seen = near.blended(lifted.texture.visibility[lifted.is_body, None])[:, 0]
     if matte is None:
         return _glb([MeshPart(world, triangles, colors=near.blended(body.colors))], None)
+    texture = object_texture(matte, lifted)
+    at_rest, camera = lifted.world_points(points), lifted.photo_camera(puppet.camera)
     is_front = seen[triangles].mean(1) > SEEN
-    camera = lifted.photo_camera(puppet.camera)
-    uv = _places_in(matte, camera.project(lifted.world_points(points)))
+    textured = [_part(world, triangles[is_front], uv=camera.project(at_rest))]
+    is_plain = ~is_front
+    if lifted.sides is not None and lifted.sides.pixels.size:
+        sides = _SideMaps(lifted, near)
+        is_side = sides.has_all(triangles) & (
+            ~is_front | (_cosines(at_rest, triangles) < STRETCHED)
+        )
+        textured = [_part(world, triangles[is_front & ~is_side], uv=camera.project(at_rest))]
+        textured += sides.parts(world, at_rest, triangles[is_side])
+        is_plain &= ~is_side
+    height, width = texture.levels[0].shape[:2]
+    corner, size = np.array([texture.left, texture.top]), np.array([width, height])
     parts = [
-        _part(world, triangles[is_front], uv=uv),
-        _part(world, triangles[~is_front], colors=near.blended(body.colors)),
+        _joined(textured, corner, size),
+        _part(world, triangles[is_plain], colors=near.blended(body.colors)),
     ]
-    return _glb([part for part in parts if len(part.triangles)], _texture(matte))
+    pixels = np.rint(np.clip(texture.levels[0][..., :3], 0, 1) * 255).astype(np.uint8)
+    return _glb([part for part in parts if len(part.triangles)], _jpeg(pixels))
+
+
+def _cosines(points: F64, triangles: I64) -> F64:
+    """(T,) of triangles (T, 3) with the lines of sight of a camera at the origin."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normal, middle = np.cross(b - a, c - a), (a + b + c) / 3
+    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(middle, axis=1)
+    return -(normal * middle).sum(1) / np.maximum(length, 1e-300)
+
+
+class _SideMaps:
+    """Where the invented pictures show the surface: px of the photo, as `Sides.at`."""
+
+    def __init__(self, lifted: LiftedObject, near: _Nearest) -> None:
+        assert lifted.sides is not None, "the caller checks"
+        self._sides: Sides = lifted.sides.select(lifted.is_body)
+        self._means = lifted.world_points(lifted.body.means.astype(np.float64))
+        self._carriers = near.best(self._sides.zoom > 0)  # (V,) a Gaussian on a picture, or -1
+
+    def has_all(self, triangles: I64) -> Mask:
+        """(T,) whose three corners are near Gaussians that are on a picture."""
+        return np.asarray((self._carriers[triangles] >= 0).all(axis=1))
+
+    def parts(self, world: F64, at_rest: F64, triangles: I64) -> list[MeshPart]:
+        """Triangles whose corners see one picture, and those on a seam, with corners of their own.
+
+        `world` (V, 3) where the vertices are, `at_rest` where they were in the photo.
+        """
+        corners = self._carriers[triangles]
+        first = np.repeat(corners[:, :1], 3, axis=1)
+        own, alike = self._at(corners, at_rest[triangles]), self._at(first, at_rest[triangles])
+        extent = np.ptp(alike, axis=1).max(-1)
+        is_one = np.abs(own - alike).max(-1).max(-1) < APART + 0.25 * extent
+        uv = self._at(np.maximum(self._carriers, 0), at_rest)
+        seam = triangles[~is_one].ravel()
+        alone = MeshPart(
+            world[seam], np.arange(len(seam)).reshape(-1, 3), uv=alike[~is_one].reshape(-1, 2)
+        )
+        return [_part(world, triangles[is_one], uv=uv), alone]
+
+    def _at(self, carriers: I64, points: F64) -> F64:
+        """(..., 2) of `points` (..., 3) as the maps of the Gaussians `carriers` (...) say."""
+        slopes = self._sides.slopes[carriers].astype(np.float64)
+        offsets = points - self._means[carriers]
+        return self._sides.at[carriers] + np.einsum("...ij,...j->...i", slopes, offsets)
+
+
+def _joined(parts: list[MeshPart], corner: np.ndarray, size: np.ndarray) -> MeshPart:
+    """Parts that show px of the photo as one that shows a picture with this corner and size."""
+    first = np.cumsum([0, *(len(part.points) for part in parts)])
+    triangles = [part.triangles + start for part, start in zip(parts, first, strict=False)]
+    uv = [part.uv for part in parts if part.uv is not None]
+    return MeshPart(
+        np.concatenate([part.points for part in parts]), np.concatenate(triangles),
+        uv=(np.concatenate(uv) - corner) / size,
+    )  # fmt: skip
 
 
 def _part(points: F64, triangles: I64, **values: F64) -> MeshPart:
@@ -240,6 +314,14 @@ class _Nearest:
         weights = np.exp(-((far / width) ** 2)) * np.maximum(facing, 1e-3)
         self._which, self._weights = which, weights / weights.sum(1, keepdims=True)
 
+    def best(self, is_wanted: np.ndarray) -> I64:
+        """(V,) of those near each vertex the one with most weight that `is_wanted` (N,), or -1."""
+        weights = np.where(is_wanted[self._which], self._weights, -1.0)
+        rows = np.arange(len(weights))
+        column = np.argmax(weights, axis=1)
+        found = np.asarray(self._which)[rows, column]
+        return np.where(weights[rows, column] >= 0, found, -1)
+
     def blended(self, values: np.ndarray) -> F64:
         """(V, C) of the Gaussians' (N, C)."""
         return np.einsum("vk,vkc->vc", self._weights, values[self._which].astype(np.float64))
@@ -255,15 +337,8 @@ def vertex_normals(points: F64, triangles: I64) -> F64:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 
 
-def _places_in(matte: Matte, px: F64) -> F64:
-    """(V, 2) where in the matte's crop photo px (V, 2) are; the crop is 1 x 1."""
-    height, width = matte.alpha.shape
-    return (px - np.array([matte.left, matte.top])) / np.array([width, height])
-
-
-def _texture(matte: Matte) -> bytes:
-    pixels = at_most(np.rint(np.clip(matte.shown, 0, 1) * 255).astype(np.uint8), TEXTURE_SIDE)
-    return encode_picture(Picture(to_u8(pixels)), ".jpg")
+def _jpeg(pixels: np.ndarray) -> bytes:
+    return encode_picture(Picture(to_u8(at_most(pixels, TEXTURE_SIDE))), ".jpg")
 
 
 def _glb(parts: list[MeshPart], texture: bytes | None) -> bytes:

@@ -184,7 +184,7 @@ def test_votes_are_the_mean_of_what_the_patches_say():
                 weights.append(shares[i, j])
         if said:
             expected[row, column] = np.average(said, 0, weights)
-    vote(frozen(layers), frozen(sources), frozen(shares), frozen(hole), voted)
+    vote(frozen(layers), frozen(sources), frozen(shares), frozen(hole), voted, 0, len(hole))
     np.testing.assert_allclose(voted, expected, atol=1e-5)
 
 

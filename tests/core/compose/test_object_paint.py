@@ -118,6 +118,23 @@ def test_back_at_rest_the_photo_is_its_own_where_nothing_was_painted(place: str)
         assert (result.pixels != photo).any(), "what it shows of the photo is painted"
 
 
+@pytest.mark.parametrize("place", ["at rest", "turned", "its back"])
+def test_painted_pixels_are_counted_as_painted_wherever_they_lie(place: str):
+    """On what the photo shows, and on what was invented: they are of neither."""
+    document = _placed(PLACES[place])
+    stroke = _stroke(document)
+    plain, painted = (composite(d) for d in (document, _painted(document, stroke)))
+    assert plain.shares.from_paint == 0
+    own = painted.shares
+    parts = own.from_photo, own.from_lifter, own.from_inpainter, own.from_refiner, own.from_paint
+    assert sum(parts) == pytest.approx(1, abs=1e-6)
+    is_painted = (painted.pixels != plain.pixels).any(2) & (stroke.coverage > 0)
+    share = stroke.coverage[is_painted].sum() / painted.changed
+    assert own.from_paint == pytest.approx(share, rel=0.25)
+    if place == "its back":
+        assert own.from_lifter < plain.shares.from_lifter - 0.5 * own.from_paint
+
+
 def test_a_spot_sticks_to_its_place_on_the_surface():
     document = _placed(PLACES["turned"])
     item, camera = document.objects[0], document.photo.camera

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +13,20 @@ import trimesh
 
 from objectmorpher.__main__ import main
 from objectmorpher.cli import commands
+from objectmorpher_core.base.brush import Brush, Stroke
 from objectmorpher_core.base.rotations import quats_from_matrices
+from objectmorpher_core.compose.light.lighting import object_texture
+from objectmorpher_core.compose.paint import look, with_stroke
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import Document, LiftSettings, Placement
+from objectmorpher_core.pipeline import lift_mask
+from objectmorpher_core.raster import tiles
+from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.splat_files import SplatFileError, encode
-from objectmorpher_core.splat_files.meshes.textured import surface_of
+from objectmorpher_core.splat_files.meshes.textured import surface_of, textured_glb
+from tests import shapes
 
 AXES = np.array([0.5, 0.4, 0.3])
 
@@ -76,6 +88,69 @@ def test_convert_writes_a_mesh_in_the_colours_of_the_gaussians(tmp_path: Path) -
     cloud = read(back)
     unit = cloud.means / AXES
     assert np.abs(cloud.colors - np.clip(unit * 0.5 + 0.5, 0, 1)).mean() < 0.02
+
+
+@cache
+def _lifted() -> Document:
+    """An object with invented sides, turned until they are seen."""
+    scene = shapes.scene("ellipse", 2500)
+    shape = LiftSettings(2500, trust=0, back="continued")
+    lift = lift_mask(scene.pixels, scene.camera, scene.mask, "relief", shape)
+    document = edits.set_lifted(scene.document(), 0, *lift, shape)
+    return edits.set_placement(document, 0, Placement(turn=(75.0, 0.0, 0.0)))
+
+
+def _splats(document: Document) -> PosedSplats:
+    item = document.objects[0]
+    return puppet_of(item, document.photo.camera).posed(item.pose, item.placement)
+
+
+def _painted(document: Document) -> Document:
+    """With a broad green stroke across what is seen of it."""
+    item, camera, splats = document.objects[0], document.photo.camera, _splats(document)
+    (x0, y0), (x1, y1) = np.percentile(camera.project(splats.means), (25, 75), axis=0)
+    stroke = Stroke(document.photo.size, Brush(8.0, 1.0))
+    stroke.move_to(float(x0), float(y0))
+    stroke.move_to(float(x1), float(y1))
+    assert item.matte is not None and stroke.box is not None
+    left, top, right, bottom = stroke.box
+    seen = look(splats, item.matte, camera, stroke.box)
+    matte = with_stroke(item.matte, seen, stroke.coverage[top:bottom, left:right], GREEN)
+    return document.with_object(0, replace(item, matte=matte))
+
+
+GREEN = np.array([0.05, 0.9, 0.1])
+
+
+@pytest.mark.parametrize("is_painted", [False, True])
+def test_a_mesh_shows_its_sides_and_the_paint_on_them_as_the_program_does(is_painted: bool) -> None:
+    document = _painted(_lifted()) if is_painted else _lifted()
+    item, camera = document.objects[0], document.photo.camera
+    glb = textured_glb(item, puppet_of(item, camera))
+    parts = trimesh.load_scene(io.BytesIO(glb), file_type="glb").geometry.values()
+    (textured,) = (part for part in parts if part.visual.uv is not None)
+    picture = np.asarray(textured.visual.material.baseColorTexture.convert("RGB")) / 255
+    corners, uv = textured.vertices[textured.faces] * (1, -1, -1), textured.visual.uv
+    middle, at = corners.mean(1), uv[textured.faces].mean(1) * (1, -1) + (0, 1)
+    own = picture[tuple((at[:, ::-1] * picture.shape[:2]).astype(int).clip(0).T)]
+    # What is seen of it, as the program draws it.
+    assert item.matte is not None
+    shown = tiles.render(_splats(document), object_texture(item.matte, item.lifted), camera, camera)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cosines = -(normals * middle).sum(1) / np.linalg.norm(normals, axis=1).clip(1e-12)
+    column, row = camera.project(middle).astype(int).T
+    depth = shown.depth[row, column]
+    is_seen = (cosines > 0.3 * middle[:, 2]) & (np.abs(depth - middle[:, 2]) < 0.02 * depth)
+    is_seen &= shown.alpha[row, column] > 0.98
+    assert is_seen.sum() > 300
+    apart = np.abs(own - shown.color[row, column])[is_seen].mean(1)
+    assert apart.mean() < 0.04 and np.quantile(apart, 0.9) < 0.12
+    is_green = (np.abs(shown.color[row, column] - GREEN).max(1) < 0.08) & is_seen
+    if not is_painted:
+        assert not is_green.any()
+        return
+    assert is_green.sum() > 40
+    assert (np.abs(own - GREEN).max(1) < 0.2)[is_green].mean() > 0.9
 
 
 @pytest.mark.slow

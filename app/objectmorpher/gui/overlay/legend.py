@@ -48,7 +48,10 @@ class Legend:
     @property
     def _provenance_rows(self) -> int:
         document = self._editor.document
-        return 4 if document is None or document.refined is None else 5
+        if document is None:
+            return 4
+        is_painted = any(item.is_painted for item in document.objects)
+        return 4 + is_painted + (document.refined is not None)
 
     @property
     def _panel_height(self) -> float:
@@ -109,7 +112,10 @@ class Legend:
             (LIFTED, t("invented on the object"), counted.from_lifter),
             (INPAINTED, t("invented behind it"), counted.from_inpainter),
         ]
-        if self._provenance_rows > len(rows) + 1:
+        document = editor.document or editor.history.document  # whose rows were counted
+        if any(item.is_painted for item in document.objects):
+            rows.insert(2, (LIFTED, t("painted on it"), counted.from_paint))
+        if document.refined is not None:
             rows.append((REFINED, t("refined by the network"), counted.from_refiner))
         for hatch, text, share in rows:
             self._swatch(grey, hatch)

@@ -13,7 +13,7 @@ from ...editor.editor import Editor
 from ...system.texts import t
 from ..widgets.theme import SMALL_SIZE, Icon, theme
 from ..widgets.widgets import (
-    FILL,
+    GAP,
     Number,
     checkbox,
     command_button,
@@ -22,14 +22,16 @@ from ..widgets.widgets import (
     icon_button,
     note,
     number_field,
+    small_text,
     tooltip,
 )
+from ..window.landmarks import mark
 from .animation import draw_timeline
 
 RESET = 24.0  # points, side of the button that resets a group
 DEPTHS = (-1.5, 3.0)  # object diameters, ends of the slider
 DONE = {
-    "Right": "Move object", "Down": "Move object", "Away": "Move object in depth",
+    "Right": "Move object", "Down": "Move object", "Farther": "Move object in depth",
     "Yaw": "Turn object", "Pitch": "Turn object", "Roll": "Roll object", "Scale": "Scale object",
 }  # fmt: skip
 
@@ -47,7 +49,7 @@ GROUPS = (
     Group("Position", "reset_position", (
         Number("Right", "%.1f px", 0.5, 1.0),
         Number("Down", "%.1f px", 0.5, 1.0),
-        Number("Away", "%.2f ×", 0.005, 0.05),
+        Number("Farther", "%.2f × its size", 0.005, 0.05),
     )),
     Group("Turn", "reset_turn", (
         Number("Yaw", "%.1f°", 0.25, 1.0),
@@ -71,7 +73,7 @@ def draw_place(editor: Editor) -> None:
     for group in GROUPS:
         _draw_title(editor, group)
         for number in group.numbers:
-            shown = replace(number, name=t(number.name))
+            shown = replace(number, name=t(number.name), format=t(number.format))
             change = number_field(shown, values[number.name])
             values[number.name] = change.value
             if change.is_changed:
@@ -115,15 +117,32 @@ def _draw_title(editor: Editor, group: Group) -> None:
 
 
 def _draw_depth(editor: Editor, placement: Placement) -> None:
-    """Nearer on the left, farther on the right."""
-    imgui.set_next_item_width(FILL)
+    """A slider between the words for its ends: nearer on the left, farther on the right."""
+    near, far = t("Nearer"), t("Farther")
+    imgui.align_text_to_frame_padding()
+    _say(near)
+    imgui.same_line(0, theme.pt(GAP))
+    room = imgui.get_content_region_avail().x
+    with small_text():
+        beyond = imgui.calc_text_size(far).x + theme.pt(GAP)
+    imgui.set_next_item_width(room - beyond)
     low, high = min(DEPTHS[0], placement.depth), max(DEPTHS[1], placement.depth)
     is_changed, depth = imgui.slider_float("##depth", placement.depth, low, high, "")
-    tooltip(t("Nearer or farther, in diameters of the object"))
+    mark(t("Nearer or farther"))
+    tooltip(t("How much farther away it is than in the photo, in sizes of the object"))
     if is_changed:
         editor.placing.move_away(depth)
     if imgui.is_item_deactivated_after_edit():
         editor.commit(t("Move object in depth"))
+    imgui.same_line(0, theme.pt(GAP))
+    imgui.align_text_to_frame_padding()
+    _say(far)
+
+
+def _say(word: str) -> None:
+    """A word at an end of the slider."""
+    with small_text():
+        imgui.text_colored(theme.vec("secondary"), word)
 
 
 def _draw_seen_from(editor: Editor) -> None:

@@ -16,7 +16,7 @@ from ...editor.intents.posing import Numbers
 from ...editor.intents.rigging import MovedPart
 from ...editor.view import BRUSHES, PoseMode, Shown
 from ...system.texts import t
-from ..widgets.segmented import Segment, segmented
+from ..widgets.segmented import Segment, named_icons, segmented
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import (
     BETWEEN,
@@ -205,12 +205,12 @@ def _draw_place(editor: Editor, numbers: Numbers) -> None:
     fields = (
         (Number("X", "%.1f px", PER_PX, 1.0, numbers.rest[0]), "x"),
         (Number("Y", "%.1f px", PER_PX, 1.0, numbers.rest[1]), "y"),
-        (Number(t("Depth"), "%.2f ×", 0.005, 0.05), "depth"),
+        (Number(t("Depth"), t("%.2f × its size"), 0.005, 0.05), "depth"),
     )
     for number, name in fields:
         change = number_field(number, getattr(numbers, name))
         if name == "depth":
-            tooltip(t("In diameters of the object, away from you"))
+            tooltip(t("How much farther away, in sizes of the object; below 0 it is nearer"))
         if change.is_changed:
             wanted = replace(numbers, **{name: change.value})
             editor.handle_numbers.move(wanted.x, wanted.y, wanted.depth)
@@ -236,6 +236,10 @@ ICONS = {
     PoseMode.DRAG: Icon.POSE, PoseMode.FREEZE: Icon.FREEZE, PoseMode.STIFFEN: Icon.STIFFEN,
     PoseMode.BODY: Icon.BODY, PoseMode.CUT: Icon.CUT, PoseMode.GLUE: Icon.GLUE,
 }  # fmt: skip
+WORDS = {
+    PoseMode.DRAG: "Drag", PoseMode.FREEZE: "Freeze", PoseMode.STIFFEN: "Stiffen",
+    PoseMode.BODY: "Group", PoseMode.CUT: "Cut", PoseMode.GLUE: "Glue",
+}  # fmt: skip
 NOTES = {
     PoseMode.FREEZE: "Paint what must stay exactly where it is now.",
     PoseMode.STIFFEN: "Paint what must bend less than the rest, or more.",
@@ -251,8 +255,10 @@ NOTES = {
 def draw_modes(editor: Editor) -> None:
     """The row of what dragging does, and its settings."""
     view = editor.view.pose
-    modes = tuple(Segment(mode, ICONS[mode], t(mode.value)) for mode in PoseMode)
-    view.mode = segmented("mode", modes, view.mode)
+    modes = tuple(
+        Segment(mode, t(WORDS[mode]), t(mode.value), icon=ICONS[mode]) for mode in PoseMode
+    )
+    view.mode = named_icons("mode", modes, view.mode)
     if view.mode is PoseMode.DRAG:
         return
     gap(8)

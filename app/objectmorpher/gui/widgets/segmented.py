@@ -65,6 +65,9 @@ def _named(name: str) -> str:
 
 T = TypeVar("T")
 INSET = 2.0  # points between the row's edge and the chosen part
+TALL = 44.0  # points, height of a row whose words stand below their icons
+WORD = 13.0  # points, size of those words
+ASIDE = 1.0  # points, at least, from a word to the edge of its part
 
 
 @dataclass(frozen=True)
@@ -104,18 +107,73 @@ def segmented(name: str, choices: Sequence[Segment[T]], chosen: T) -> T:
     return chosen
 
 
+def named_icons(name: str, choices: Sequence[Segment[T]], chosen: T) -> T:
+    """Draw values side by side, each an icon above its word, and return the chosen one.
+
+    Words that are too long for that, in another language, stand in two rows.
+    """
+    room = theme.pt(2 * (ASIDE + INSET))
+    imgui.push_font(None, WORD)
+    widest = max(imgui.calc_text_size(choice.label).x for choice in choices)
+    imgui.pop_font()
+    fits = len(choices) * (widest + room) <= imgui.get_content_region_avail().x
+    across = len(choices) if fits else -(-len(choices) // 2)
+    for first in range(0, len(choices), across):
+        row = choices[first : first + across]
+        chosen = _draw_row_of_icons(f"{name}{first}", row, across, chosen)
+    return chosen
+
+
+def _draw_row_of_icons(name: str, choices: Sequence[Segment[T]], columns: int, chosen: T) -> T:
+    start = imgui.get_cursor_screen_pos()
+    width, height = imgui.get_content_region_avail().x, theme.pt(TALL)
+    part, end = width / columns, ImVec2(start.x + width, start.y + height)
+    draw = imgui.get_window_draw_list()
+    draw.add_rect_filled(start, end, theme.u32("raised"), theme.pt(RADIUS))
+    for i, choice in enumerate(choices):
+        low = ImVec2(round(start.x + i * part), start.y)
+        size = ImVec2(round(start.x + (i + 1) * part) - low.x, height)
+        imgui.set_cursor_screen_pos(low)
+        if drawn_button(f"##{name}{i}", size):
+            chosen = choice.value
+        mark(choice.hint or choice.label)
+        is_chosen, is_hovered = choice.value == chosen, imgui.is_item_hovered()
+        if choice.hint:
+            tooltip(choice.hint)
+        role = _draw_ground(low, size, is_chosen, is_hovered)
+        middle = low.x + size.x / 2
+        icon = imgui.calc_text_size(choice.icon)
+        draw.add_text(
+            ImVec2(round(middle - icon.x / 2), round(low.y + theme.pt(6))), theme.u32(role),
+            choice.icon,
+        )  # fmt: skip
+        imgui.push_font(None, WORD)
+        word = imgui.calc_text_size(choice.label)
+        at = ImVec2(round(middle - word.x / 2), round(end.y - theme.pt(5) - word.y))
+        draw.add_text(at, theme.u32(role), choice.label)
+        imgui.pop_font()
+    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y))
+    imgui.dummy(ImVec2(width, 0))
+    return chosen
+
+
 def _draw_part(
     low: ImVec2, size: ImVec2, choice: Segment, is_chosen: bool, is_hovered: bool
 ) -> None:
+    role = _draw_ground(low, size, is_chosen, is_hovered)
+    alpha = imgui.get_style().disabled_alpha if choice.why_not else 1.0
+    shown = f"{choice.icon}  {choice.label}" if choice.icon else choice.label
+    text = imgui.calc_text_size(shown)
+    at = ImVec2(round(low.x + (size.x - text.x) / 2), round(low.y + (size.y - text.y) / 2))
+    imgui.get_window_draw_list().add_text(at, theme.u32(role, alpha), shown)
+
+
+def _draw_ground(low: ImVec2, size: ImVec2, is_chosen: bool, is_hovered: bool) -> str:
+    """Draw what lies behind a part; the role of the colour of what stands on it."""
     draw, inset = imgui.get_window_draw_list(), theme.pt(INSET)
     if is_chosen or is_hovered:
         inner = ImVec2(low.x + inset, low.y + inset)
         outer = ImVec2(low.x + size.x - inset, low.y + size.y - inset)
         fill = theme.u32("accent" if is_chosen else "hovered")
         draw.add_rect_filled(inner, outer, fill, theme.pt(RADIUS - INSET))
-    role = "on_accent" if is_chosen else "secondary"
-    alpha = imgui.get_style().disabled_alpha if choice.why_not else 1.0
-    shown = f"{choice.icon}  {choice.label}" if choice.icon else choice.label
-    text = imgui.calc_text_size(shown)
-    at = ImVec2(round(low.x + (size.x - text.x) / 2), round(low.y + (size.y - text.y) / 2))
-    draw.add_text(at, theme.u32(role, alpha), shown)
+    return "on_accent" if is_chosen else "secondary"

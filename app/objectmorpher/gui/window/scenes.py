@@ -127,6 +127,9 @@ def splat_objects(document: Document, frame: Frame) -> tuple[SplatObject | Canva
         if isinstance(own, CanvasLayer):
             found.append(own)
             continue
+        if own.layer is not None:
+            found.append(own.layer)
+            continue
         part, look = own.part, own.lit
         item = SplatObject(
             own.splats, own.shape.texture, document.photo.camera,
