@@ -115,22 +115,23 @@ A shadow is looked for in two ways. Shadows of the thing's own silhouette are la
 all directions and lengths, and what explains the photo best is asked how much speaks for it. And a
 small network sees the same surroundings: a U-Net of 0.64 million weights that reads 96 x 96 cells
 about the thing (`objectmorpher_core/models/shadow.onnx`, 1.3 MB, Apache-2.0, SHA-256
-`{shadow_network}`). It was trained from nothing on 48,000 pictures of 2,900 made scenes for an hour
-on two cores (`objectmorpher train shadow`): things of boxes, balls, cylinders and boards, on
-photographed and drawn grounds, under one or two lamps, with neighbours, walls, patches and shades of
-something else; four in ten have no shadow of the thing. None of the solids, scenes and photographs
-on this page are among them, but for seven textures of the half below on which the margins were
-chosen. Where the network sees shade says which of the shadows that were tried it is; how sure it is
-counts most in whether there is one.
+`{shadow_network}`). It was trained
+from nothing, in 4,400 steps on 64,000 pictures of 2,900 made scenes, within an hour on two busy
+cores (`objectmorpher train shadow`): things of boxes, balls, cylinders and boards, on photographed
+and drawn grounds, under one or two lamps, with neighbours, walls, patches and shades of something
+else; four in ten have no shadow of the thing. No solid and no scene on this page was trained on, nor
+any photograph that the half below shows which was held out; parts of those of the other half were,
+as grounds and backgrounds, the cup's photo among them. Where the network sees shade says which of
+the shadows that were tried it is; how sure it is counts most in whether there is one.
 
-Whether anything is imagined is asked of 1,000 scenes (`python docs/compositing/imagined.py`): solids
-and upright pictures on photographed and drawn grounds, with walls, neighbours, edges of another
-material and dappled light, of which more than half have no shadow of the thing. The half that was
-held out has other seeds and shows other photos. A shadow is *large* that is darker than 12 % on a
-seventh of the thing's area or more. It is *visible in principle* if an observer could be sure of it
-who knows its form and what the ground looks like without it: laid on the photo where it is, the form
-explains more darkness than it does at 99 of 100 other places and turns on the ground without the
-shadow.
+Whether anything is imagined is asked of 1,000 scenes (`python docs/compositing/imagined.py`):
+solids and upright pictures on photographed and drawn grounds, with walls, neighbours, edges of
+another material and dappled light, of which more than half have no shadow of the thing. The half
+that was held out has other seeds and shows other photos. A shadow is *large* that is darker than
+12 % on a seventh of the thing's area or more. It is *visible in principle* if an observer could be
+sure of it who knows its form and what the ground looks like without it: laid on the photo where it
+is, the form explains more darkness than it does at 99 of 100 other places and turns on the ground
+without the shadow.
 
 {imagined}
 
