@@ -119,9 +119,9 @@ about the thing (`objectmorpher_core/models/shadow.onnx`, 1.3 MB, Apache-2.0, SH
 from nothing, in 4,400 steps on 64,000 pictures of 2,900 made scenes, within an hour on two busy
 cores (`objectmorpher train shadow`): things of boxes, balls, cylinders and boards, on photographed
 and drawn grounds, under one or two lamps, with neighbours, walls, patches and shades of something
-else; four in ten have no shadow of the thing. No solid and no scene on this page was trained on, nor
-any photograph that the half below shows which was held out; parts of those of the other half were,
-as grounds and backgrounds, the cup's photo among them. Where the network sees shade says which of
+else; four in ten have no shadow of the thing. No solid and no scene on this page was trained on,
+nor any photograph of the half below that was held out; parts of those of the other half were, as
+grounds and backgrounds, the cup's photo among them. Where the network sees shade says which of
 the shadows that were tried it is; how sure it is counts most in whether there is one.
 
 Whether anything is imagined is asked of 1,000 scenes (`python docs/compositing/imagined.py`):
