@@ -58,7 +58,8 @@ def look_for_shadow(brightness: F32, colour: F32, cover: F32, free: Mask) -> See
     shade, odds = _session().run(None, {"planes": planes[None]})
     chance = 1 / (1 + np.exp(-np.asarray(shade[0], np.float32)))
     whole = cv2.resize(chance, (2 * SIDE, 2 * SIDE), interpolation=cv2.INTER_LINEAR)
-    return SeenShadow(_middle(whole, *brightness.shape), float(odds[0]))
+    shade_there = _middle(np.asarray(whole, np.float32), *brightness.shape)
+    return SeenShadow(shade_there, float(odds[0]))
 
 
 @cache

@@ -97,7 +97,7 @@ def _pebbles(rng: np.random.Generator) -> F64:
     plane = cv2.Subdiv2D((0, 0, SIDE, SIDE))
     for x, y in rng.uniform(0, SIDE, (int(rng.integers(20, 400)), 2)):
         plane.insert((float(x), float(y)))
-    cells = [cell.astype(np.int32) for cell in plane.getVoronoiFacetList([])[0]]
+    cells = [np.asarray(cell, np.int32) for cell in plane.getVoronoiFacetList([])[0]]
     drawn, base = np.zeros((SIDE, SIDE, 3), np.float32), any_colour(rng)
     spread = rng.uniform(0.07, 1.1)
     for cell in cells:

@@ -154,7 +154,7 @@ def any_turn(rng: np.random.Generator, tilt: float = 0.0) -> F64:
     yaw = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
     if tilt <= 0:
         return yaw
-    return np.asarray(cv2.Rodrigues(rng.normal(size=3) * tilt)[0]) @ yaw
+    return np.asarray(cv2.Rodrigues(rng.normal(size=3) * tilt)[0] @ yaw, np.float64)
 
 
 class _Builder:
