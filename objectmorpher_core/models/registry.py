@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, TypeVar
 
-# The program's own weights, which come with it (docs/shape_network).
+# The program's own weights, which come with it (docs/shape_network, docs/compositing).
 
 PACKAGE, SHAPE, SHADOW = "objectmorpher_core.models", "shape.onnx", "shadow.onnx"
 TOKENS = "dinov2-vits14"  # the weight whose tokens the shape network reads

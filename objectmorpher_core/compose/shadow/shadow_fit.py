@@ -29,7 +29,7 @@ from ...document.model import Matte
 from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, FROM_ABOVE, OldShadow
 from .shadow import DARKEST, GAMMA
-from .shadow_look import SeenShadow, look_for_shadow
+from .shadow_look import CELLS, SeenShadow, look_for_shadow
 from .shadow_shear import Flat, ShadowSheet, lie, stand
 
 # Linear regression that outliers do not spoil (Huber's loss, iteratively reweighted).
@@ -231,7 +231,6 @@ def _tint(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> float
 
 
 SHEET_GROUND = 30.0  # degrees: a silhouette alone shows no ground
-CELLS = 64  # along the object's longer side
 AROUND = 1.0  # x that side, how far around the object one looks
 NEAR = 0.6  # x that side, over which what is seen weighs less
 LUMA = np.array([0.3, 0.5, 0.2], np.float32)
@@ -414,7 +413,7 @@ def _tried(seen: Surroundings, ground: ShadowGround, shadow: Shadow) -> TriedSha
 def _searched(
     seen: Surroundings, looked: SeenShadow, ground: ShadowGround, lengths: tuple[float, ...]
 ) -> TriedShadow | None:
-    """Of all directions and lengths what explains most where the network sees shade; then finer."""
+    """The shadow that explains most where the network sees shade, then the best that is near it."""
     few = _thinned(ground, seen.cover.shape[1])
     tried = [_tried(seen, few, shadow) for shadow in _coarsely(lengths)]
     gained = [f for f in tried if f is not None]

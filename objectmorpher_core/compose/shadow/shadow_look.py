@@ -17,6 +17,7 @@ from ...models import registry
 from ...models.onnx_session import open_session
 
 SIDE, THING = 96, 32  # cells of what the network sees, and of the thing's longer side in it
+CELLS = 2 * THING  # of that side on the grid that it is given
 PLANES = 5
 SEEN = 0.02  # of a cell, that the thing covers where it is looked at
 MOSTLY = 0.75  # of a cell that is ground
@@ -35,8 +36,8 @@ def planes_of(brightness: F32, colour: F32, cover: F32, free: Mask) -> F32:
     """(PLANES, h, w) what the network sees, from natural logarithms of linear light.
 
     `brightness` (h, w), `colour` (h, w, 2) ratios of red and blue to green, `cover` (h, w) of the
-    thing, `free` (h, w) where the ground is seen. Brightness and colour are those of the middle of
-    the ground, more or less.
+    thing, `free` (h, w) where the ground is seen. Brightness and colour count from the ground's
+    medians, so that exposure and white balance change nothing.
     """
     middle = float(np.median(brightness[free])) if free.any() else 0.0
     tone = np.median(colour[free], 0) if free.any() else np.zeros(2)
@@ -48,9 +49,9 @@ def planes_of(brightness: F32, colour: F32, cover: F32, free: Mask) -> F32:
 
 
 def look_for_shadow(brightness: F32, colour: F32, cover: F32, free: Mask) -> SeenShadow:
-    """Look at surroundings (h, w) on a grid on which the thing is 2 THING cells long.
+    """Look at surroundings (h, w) on a grid in whose middle the thing is, CELLS long.
 
-    Its middle is the grid's; otherwise as `planes_of`.
+    The fields are those of `planes_of`. The answer is on the same grid.
     """
     parts = (brightness, colour, cover, free.astype(np.float32))
     small = [_shrunk(part) for part in parts]
@@ -68,7 +69,7 @@ def _session() -> Any:
 
 
 def _shrunk(field: F32) -> F32:
-    """A field (h, w) or (h, w, n) in the middle of 2 SIDE cells, at half the resolution."""
+    """A field (h, w) or (h, w, n) as the network sees it: SIDE cells, at half the resolution."""
     whole = _middle(np.asarray(field, np.float32), 2 * SIDE, 2 * SIDE)
     return np.asarray(cv2.resize(whole, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.float32)
 

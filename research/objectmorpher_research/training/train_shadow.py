@@ -32,7 +32,7 @@ from .shadows.grounds import Grounds
 from .shadows.samples import ShadowSample, make_sample
 from .shadows.scenes import SceneGeometry, make_geometry, packed, unpacked
 from .shadows.solids import silhouettes
-from .train_shape import MEMORY, schedule
+from .train_shape import follow, schedule
 
 SHARD = 64  # scenes in a file, and samples that are handed over at once
 BOARDS, BOARDS_SEED = 160, 5
@@ -202,12 +202,7 @@ class ShadowState:
         torch.nn.utils.clip_grad_norm_(self.net.parameters(), STEEPEST)
         self.optimiser.step()
         self.step += 1
-        kept = min(MEMORY, (1 + self.step) / (10 + self.step))
-        for name, value in self.net.state_dict().items():
-            if value.is_floating_point():
-                self.mean[name].lerp_(value, 1 - kept)
-            else:
-                self.mean[name].copy_(value)
+        follow(self.mean, self.net, self.step)
         self.loss += (float(whole.detach()) - self.loss) / min(self.step, 50)
         return parts
 

@@ -182,12 +182,7 @@ class _State:
         torch.nn.utils.clip_grad_norm_(self.net.parameters(), STEEPEST)
         self.optimiser.step()
         self.step += 1
-        kept = min(MEMORY, (1 + self.step) / (10 + self.step))
-        for name, value in self.net.state_dict().items():
-            if value.is_floating_point():
-                self.mean[name].lerp_(value, 1 - kept)
-            else:
-                self.mean[name].copy_(value)
+        follow(self.mean, self.net, self.step)
         self.history.append({k: round(float(v.detach()), 5) for k, v in parts.items()})
 
     def recent(self) -> float:
@@ -202,6 +197,16 @@ class _State:
         }  # fmt: skip
         torch.save(kept, partial)
         os.replace(partial, self.file)
+
+
+def follow(mean: dict[str, Tensor], net: torch.nn.Module, step: int) -> None:
+    """Move a running mean of a network's weights towards those after so many steps."""
+    kept = min(MEMORY, (1 + step) / (10 + step))
+    for name, value in net.state_dict().items():
+        if value.is_floating_point():
+            mean[name].lerp_(value, 1 - kept)
+        else:
+            mean[name].copy_(value)
 
 
 def schedule(share: float) -> float:
