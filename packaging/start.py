@@ -35,9 +35,9 @@ def main() -> int:
 
     installation.prepare(INSIDE)
     trust_certificates()
-    from objectmorpher.__main__ import main as run
+    from objectmorpher.__main__ import run
 
-    return run()
+    run()
 
 
 def is_own(script: Path) -> bool:

@@ -43,26 +43,31 @@ def add_train(parser: argparse.ArgumentParser) -> None:
 def _add_shape(parser: argparse.ArgumentParser) -> None:
     parser.description = "Trains on endless made-up objects; called again it goes on."
     add = parser.add_argument
-    add("--folder", type=Path, required=True, metavar="DIR", help="samples and checkpoints")
     add("--samples", type=int, default=8192, metavar="N", help="objects to make")
     add("--passes", type=float, default=4.0, metavar="P", help="over all of them")
-    add("--minutes", type=float, metavar="M", help="at most; go on with another call")
     add("--hold-out", type=_words, metavar="A,B", help="families that are not trained on")
     add("--start", type=Path, metavar="ONNX", help="exported weights to go on from")
     add("--seed", type=int, default=0, help="0 to 49; another seed draws other samples")
-    add("-o", "--output", type=Path, metavar="F.onnx", help="default: shape.onnx in the folder")
+    _add_run(parser, "shape.onnx")
     add("--report", type=Path, metavar="F.json", help="figures; default: beside the weights")
 
 
 def _add_shadow(parser: argparse.ArgumentParser) -> None:
     parser.description = "Trains on endless made-up scenes; called again it goes on."
     add = parser.add_argument
-    add("--folder", type=Path, required=True, metavar="DIR", help="scenes and checkpoints")
     add("--scenes", type=int, default=2880, metavar="N", help="to draw, default 2880")
     add("--steps", type=int, default=5000, metavar="N", help="of 32 samples, default 5000")
-    add("--minutes", type=float, metavar="M", help="at most; go on with another call")
     add("--seed", type=int, default=0, help="another one draws other scenes")
-    add("-o", "--output", type=Path, metavar="F.onnx", help="default: shadow.onnx in the folder")
+    _add_run(parser, "shadow.onnx")
+
+
+def _add_run(parser: argparse.ArgumentParser, weights: str) -> None:
+    """Where a network of ours is trained, for how long, and what comes of it."""
+    add = parser.add_argument
+    add("--folder", type=Path, required=True, metavar="DIR",
+        help="what it is trained on, and checkpoints")  # fmt: skip
+    add("--minutes", type=float, metavar="M", help="at most; go on with another call")
+    add("-o", "--output", type=Path, metavar="F.onnx", help=f"default: {weights} in the folder")
 
 
 def _add_pairs(parser: argparse.ArgumentParser) -> None:

@@ -210,7 +210,7 @@ def follow(mean: dict[str, Tensor], net: torch.nn.Module, step: int) -> None:
 
 
 def schedule(share: float) -> float:
-    """Up, and down along a cosine."""
+    """The share of the highest rate after this share of the steps: up, then down along a cosine."""
     if share < WARM_UP:
         return share / WARM_UP
     return 0.505 + 0.495 * math.cos(math.pi * min((share - WARM_UP) / (1 - WARM_UP), 1.0))
