@@ -64,8 +64,11 @@ def _count(document: Document, cache: Cache) -> CanvasShares:
     is_changed = (edited > 0) & (through < 1 - LEAST)
     if not is_changed.any():
         return CanvasShares()
-    parts = (seen.lifted, seen.inpainted, seen.painted)
-    by_lifter, by_inpainter, by_paint = (float((p * edited)[is_changed].mean()) for p in parts)
+    # The cells of the blend are coarse: beside the edge of an edit a part of a pixel is changed.
+    parts, whole = (seen.lifted, seen.inpainted, seen.painted), float(edited[is_changed].sum())
+    by_lifter, by_inpainter, by_paint = (
+        float((p * edited)[is_changed].sum()) / whole for p in parts
+    )
     by_refiner = float(_alpha(frame.refined, view)[is_changed].mean())
     rest = 1 - by_refiner  # as the composite's figures: a refinement lies over all the others
     by_lifter, by_inpainter, by_paint = rest * by_lifter, rest * by_inpainter, rest * by_paint
