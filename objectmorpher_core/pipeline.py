@@ -341,7 +341,7 @@ class _Run:
         if wanted.duplicate is None:
             self.document = runner.placed(self.document, k, script)
             self.document = runner.finished(self.document, k, script)
-        if script.shadow == "auto" and has_left(self.document.objects[k]):
+        if script.shadow == "auto" and has_left(self.document.objects[k], self.document):
             self.casting.add(k)
 
     def close(self) -> None:

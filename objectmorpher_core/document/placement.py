@@ -122,6 +122,7 @@ def gimbal_of(item: EditObject, document: Document) -> Gimbal:
 
 
 SAME = 1e-12  # by which a cosine may differ from 1
+STILL = 1e-3  # x the object's diameter: what moves by less stays
 FOOT = 0.04  # x the object's height, from its lowest point: what touches the ground
 
 
@@ -206,6 +207,17 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
     matrix = turn_matrix(*placement.turn) @ gimbal.matrix(degrees, 0.0, 0.0)
     points = lifted.world_points(lifted.body.means)
     return turned(placement, turn_of(matrix), points, lifted, camera, gimbal.down)
+
+
+def keeps_foot(item: EditObject, document: Document) -> bool:
+    """Whether the foot of what stands is where it is in the photo, however it is turned."""
+    if item.lifted is None or not item.lifted.stands:
+        return item.placement.move == (0, 0) and item.placement.depth == 0
+    lifted, down = item.lifted, gimbal_of(item, document).down
+    points = lifted.world_points(lifted.body.means)
+    foot = foot_of(item.placement, points, lifted, document.photo.camera, down)
+    off = np.linalg.norm(foot - _still(points, lifted, down))
+    return bool(off < STILL * lifted.diameter * lifted.scale)
 
 
 def _still(points: np.ndarray, lifted: LiftedObject, down: np.ndarray) -> F64:

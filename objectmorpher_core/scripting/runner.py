@@ -32,7 +32,7 @@ from ..document.model import (
     Placement,
     Prompt,
 )
-from ..document.placement import set_seen_from, spun
+from ..document.placement import keeps_foot, set_seen_from, spun
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
@@ -344,7 +344,7 @@ def plate_task(document: Document, script: EditScript, casting: frozenset[int]) 
     """What there is to be done for the plate of a document; see `with_plate`."""
     casters = []
     for matte in _distinct(document, casting):
-        has_gone = not any(o.matte is matte and not has_left(o) for o in document.objects)
+        has_gone = not any(o.matte is matte and not has_left(o, document) for o in document.objects)
         casters.append(ShadowCaster(matte, has_gone))
     return PlateTask(
         document.photo.pixels, plate_cover(document), tuple(casters), document.hints,
@@ -357,10 +357,9 @@ def begun_plate(
 ) -> PlateAhead | None:  # fmt: skip
     """The plate of a document whose object `k` has just been cut out, and is still to be lifted.
 
-    None where that would need much memory beside the lift, or where nobody knows yet whether the
-    object will stand where its shadow is.
+    None where that would need much memory beside the lift.
     """
-    if script.lift not in LIGHT_LIFTERS or (script.spin and script.shadow == "auto"):
+    if script.lift not in LIGHT_LIFTERS:
         return None
     try:
         is_light = compose.load(script.inpaint).name in LIGHT
@@ -372,7 +371,7 @@ def begun_plate(
     item = replace(item, placement=_placement(script))
     document = edits.set_hints(document, _hints(script, document.photo.size))
     document = document.with_object(k, item)
-    casts = script.shadow == "auto" and has_left(item)
+    casts = script.shadow == "auto" and has_left(item, document)
     return PlateAhead(plate_task(document, script, frozenset({k} if casts else ())))
 
 
@@ -390,10 +389,16 @@ def _note(item: EditObject, has_gone: bool) -> str:
     return f"the shadow found beside {item.name} {goes}; {refuse}"
 
 
-def has_left(item: EditObject) -> bool:
-    """Whether it is not where its shadow in the photo is: turned and bent it still stands there."""
+def has_left(item: EditObject, document: Document) -> bool:
+    """Whether it is not where its shadow in the photo is.
+
+    Turned, spun and bent it still stands there: a spun solid's shadow is nearer to the one in the
+    photo than to any that can be made.
+    """
     place = item.placement
-    return not item.is_visible or place.move != (0, 0) or place.depth != 0 or place.scale != 1
+    if not item.is_visible or place.scale != 1:
+        return True
+    return (place.move != (0, 0) or place.depth != 0) and not keeps_foot(item, document)
 
 
 def _hints(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:

@@ -37,6 +37,8 @@ HANDLE = [{"at": [75, 50], "to": [80, 45]}]
 EDITS = {
     "turn": {"turn": [20, 0, 0]},
     "move with its shadow": {"move": [20, 5]},
+    "spin": {"spin": 20},
+    "spin and move": {"spin": 20, "move": [20, 5]},
     "removed": {"remove": True},
     "dragged": {"handle": HANDLE},
     "brighter, no shadow": {"exposure": 0.5, "scale": 0.8, "shadow": "none"},
@@ -62,7 +64,7 @@ def begun(document: Document, wanted: EditScript) -> PlateAhead | None:
 
 def asked(document: Document, wanted: EditScript) -> PlateTask:
     """What there is to be done for the plate of an edit that is complete."""
-    casts = wanted.shadow == "auto" and runner.has_left(document.objects[0])
+    casts = wanted.shadow == "auto" and runner.has_left(document.objects[0], document)
     return runner.plate_task(document, wanted, frozenset({0} if casts else ()))
 
 
@@ -115,7 +117,7 @@ def test_another_task_is_computed_anew() -> None:
 
 
 @pytest.mark.parametrize("options", [
-    {"lift": "triposplat"}, {"inpaint": "nothing"}, {"spin": 10.0},
+    {"lift": "triposplat"}, {"inpaint": "nothing"},
 ], ids=lambda options: next(iter(options)))  # fmt: skip
 def test_it_is_not_begun_where_it_would_be_heavy_wrong_or_impossible(
     options: dict[str, object],

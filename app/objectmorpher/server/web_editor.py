@@ -134,7 +134,7 @@ class WebEdit:
         if what not in FILES:
             raise EditError(f"what is to be made is one of {', '.join(FILES)}")
         stem, ending = Path(self.name).stem or "photo", Path(self.name).suffix.lower()
-        if has_left(document.objects[0]):  # its shadow in the photo goes along
+        if has_left(document.objects[0], document):  # its shadow in the photo goes along
             step = part(progress, 0.0, 0.6)
             document = with_plate(document, EditScript(), frozenset({0}), step).document
         if what == "session":
