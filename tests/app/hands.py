@@ -201,7 +201,8 @@ def opened(
 def x_display(width: int, height: int) -> Iterator[str | None]:
     """An X display of our own, or None where there is none to be had."""
     answer, told = os.pipe()
-    command = ["Xvfb", "-displayfd", str(told), "-screen", "0", f"{width}x{height}x24"]
+    # Without repeats (-r): a key that a busy machine releases late would be typed twice.
+    command = ["Xvfb", "-displayfd", str(told), "-r", "-screen", "0", f"{width}x{height}x24"]
     command += ["-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(command, stderr=subprocess.DEVNULL, pass_fds=(told,))
     os.close(told)

@@ -146,7 +146,7 @@ class Player:
         right, low = self.size[0] - 3, self.size[1] - 3
         x, y = (right, low) if here != (right, low) else (right - 1, low)
         self.write(f"mousemove {x} {y}")
-        start, waited = time.monotonic(), _waited(self.process.pid)
+        start, before = time.monotonic(), _waits(self.process.pid)
         while self.hands.places().get("Pointer", ())[:2] != [x, y]:
             if self.process.poll() is not None:
                 assert self.process.returncode == 0, f"it ended with {self.process.returncode}"
@@ -154,13 +154,18 @@ class Player:
             if self._typist is None or self._typist.poll() is not None:
                 self.write(f"mousemove {x} {y}")
             taken = time.monotonic() - start
-            own = taken - (_waited(self.process.pid) - waited)
+            own = taken - self._waited_since(before)
             if (own > STUCK and taken > STUCK) or taken > GONE:
                 raise Stuck(f"no answer for {taken:.1f} s, {own:.1f} s of them its own")
             time.sleep(0.004)
         taken = time.monotonic() - start
-        self.slowest = max(self.slowest, taken - (_waited(self.process.pid) - waited))
+        self.slowest = max(self.slowest, taken - self._waited_since(before))
         return True
+
+    def _waited_since(self, before: dict[int, float]) -> float:
+        """s that threads which still run have waited for a processor."""
+        now = _waits(self.process.pid)
+        return sum(waited - before.get(thread, 0.0) for thread, waited in now.items())
 
     def again(self) -> None:
         """Starts the program after it was quit."""
@@ -237,13 +242,13 @@ class Player:
         raise AssertionError("undoing has no end")
 
 
-def _waited(pid: int) -> float:
-    """s that a process's threads were ready to run while others had the processors."""
-    total = 0
+def _waits(pid: int) -> dict[int, float]:
+    """s that each of a process's threads was ready to run while others had the processors."""
+    waits = {}
     for path in Path(f"/proc/{pid}/task").glob("*/schedstat"):
         with contextlib.suppress(OSError, IndexError, ValueError):
-            total += int(path.read_text().split()[1])
-    return total / 1e9
+            waits[int(path.parent.name)] = int(path.read_text().split()[1]) / 1e9
+    return waits
 
 
 class Monkey:
