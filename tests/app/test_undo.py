@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -116,17 +115,13 @@ def test_a_snapshot_is_gone_back_to_as_a_step(editor: Editor, ball: Document) ->
 @pytest.mark.window
 @pytest.mark.slow
 def test_every_control_of_every_panel_is_undone(
-    window_environment: dict[str, str], tmp_path: Path
+    without_networks: dict[str, str],
 ) -> None:
-    """Each is clicked and dragged in the real window, in each tool and in what a tool unfolds.
-
-    There are no networks' weights: what a lift looks like does not matter here.
-    """
+    """Each is clicked and dragged in the real window, in each tool and in what a tool unfolds."""
     command = [sys.executable, "tests/app/flip_controls.py"]
-    own = {"PYTHONPATH": PYTHONPATH, "OBJECTMORPHER_CACHE": str(tmp_path / "weights")}
     said = subprocess.run(
-        command, cwd=ROOT, env=window_environment | own, capture_output=True, text=True,
-        timeout=5 * PATIENCE,
+        command, cwd=ROOT, env=without_networks | {"PYTHONPATH": PYTHONPATH},
+        capture_output=True, text=True, timeout=5 * PATIENCE,
     )  # fmt: skip
     assert said.returncode == 0, said.stderr[-3000:]
     rows = [json.loads(line) for line in said.stdout.splitlines()]
