@@ -15,6 +15,8 @@ PIP := $(PYTHON) -m pip --disable-pip-version-check
 # Bytecode, also where PYTHONDONTWRITEBYTECODE says that no import writes any: every window has a
 # worker process, which would compile all sources anew.
 COMPILE := $(PYTHON) -m compileall -q app objectmorpher_core research tests
+# The kernels, before processes that begin together compile the same ones.
+KERNELS := $(PYTHON) -m tests.kernels
 PHOTO ?=
 ARGS ?=
 LOCK ?= # versions and hashes of what the tests need: packaging/locks/ci.txt
@@ -44,11 +46,13 @@ run: .make/run
 
 test: .make/test
 	@$(COMPILE)
+	@$(KERNELS)
 	$(PYTEST) -m "not slow" $(ARGS)
 
 .PHONY: test-slow
 test-slow: .make/test
 	@$(COMPILE)
+	@$(KERNELS)
 	$(PYTEST) -m slow $(ARGS)
 
 # The tests of what needs PyTorch or Ray, which `make test` leaves out: networks of their real code,
@@ -58,6 +62,7 @@ TORCH ?= torch==2.13.0
 BESIDE := 'torchmetrics>=1.6' # others' measures, to compare ours with
 test-models: .make/models
 	@$(COMPILE)
+	@$(KERNELS)
 	$(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '[^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart' tests --include='test_*.py' | sort)
 
 .make/models: .make/test

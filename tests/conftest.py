@@ -124,14 +124,18 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Whole files of the slow stage, and what they import, are not read where it is not run."""
-    if config.option.markexpr != "not slow" or not collection_path.match("test_*.py"):
+    """Files of which all is in the other stage, and what they import, are not read."""
+    stage = config.option.markexpr
+    if stage not in ("slow", "not slow") or not collection_path.match("test_*.py"):
         return None
     text = collection_path.read_text(encoding="utf-8")
+    if stage == "slow":
+        return None if re.search(r"\bmark\.slow\b|\bquick\(", text) else True
     return True if re.search(r"^pytestmark = .*\bmark\.slow\b", text, re.MULTILINE) else None
 
 
 LONG = (  # files and folders of which a test takes long: they begin
+    "test_worker_killed",  # it lifts the ball, while the next ones do not need that
     "tests/fuzz", "tests/faults", "tests/soak", "test_cli_truth", "test_documented", "test_warm_up",
     "test_tools", "test_train", "core/segment", "test_autosave",
     "test_worker", "test_window", "test_first_use", "test_refin", "app/editing", "app/tools",

@@ -11,7 +11,8 @@ import hashlib
 import os
 import pickle
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +22,11 @@ from objectmorpher_core.base.arrays import F32, RGB
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.segment import dino_tokens, salience
 
+try:
+    import fcntl
+except ImportError:
+    fcntl = None  # Windows has none: there, two processes may compute the same
+
 FOLDER = "OBJECTMORPHER_TESTS_REMEMBER"  # the variable that names it
 
 Value = TypeVar("Value")
@@ -29,22 +35,38 @@ Value = TypeVar("Value")
 def once(said: bytes, compute: Callable[[], Value]) -> Value:
     """What `compute` gives, unless a process of this run has kept it for what is `said`.
 
-    Arrays that another process has computed cannot be written to.
+    Who asks while another process computes it waits for that one. Arrays that another process has
+    computed cannot be written to.
     """
     folder = os.environ.get(FOLDER)
     if folder is None:
         return compute()
     path = Path(folder) / hashlib.sha256(said).hexdigest()
-    if path.exists():
-        body, *arrays = pickle.loads(path.read_bytes())
-        return pickle.loads(body, buffers=arrays)
-    found = compute()
+    if not path.exists():
+        with _alone(path.with_suffix(".lock")):
+            if not path.exists():
+                found = compute()
+                _keep(found, path)
+                return found
+    body, *arrays = pickle.loads(path.read_bytes())
+    return pickle.loads(body, buffers=arrays)
+
+
+@contextmanager
+def _alone(lock: Path) -> Iterator[None]:
+    """Only one process at a time is here; a process that ends lets the next one in."""
+    with lock.open("w") as file:
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _keep(found: object, path: Path) -> None:
     arrays: list[pickle.PickleBuffer] = []
     body = pickle.dumps(found, 5, buffer_callback=arrays.append)
-    with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
         pickle.dump([body, *(bytes(array.raw()) for array in arrays)], file, 5)
     os.replace(file.name, path)  # whole, or not there
-    return found
 
 
 def _about(picture: RGB, what: str) -> bytes:

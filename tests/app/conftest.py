@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,12 +20,7 @@ from objectmorpher.editor.settings import Settings
 from objectmorpher.editor.view import ViewState
 from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.document.model import Document
-from tests import remembered
-
-try:
-    import fcntl
-except ImportError:
-    fcntl = None  # Windows has none
+from tests import kernels, remembered
 
 if TYPE_CHECKING:
     from desk import Desk
@@ -143,26 +136,9 @@ def display() -> Iterator[str]:
 
 
 @pytest.fixture(scope="session")
-def compiled(pytestconfig: pytest.Config) -> None:
-    """The kernels are on the disk: who compiles them answers nobody for a minute or two.
-
-    To load them all takes seconds: a list of them is kept until a source changes or one is gone.
-    """
-    folders = [hands.ROOT / "objectmorpher_core", hands.ROOT / "app" / "objectmorpher"]
-    sources = sorted(path for folder in folders for path in folder.rglob("*.py"))
-    times = repr([(str(path), path.stat().st_mtime_ns) for path in sources])
-    kept = pytestconfig.rootpath / ".pytest_cache" / "kernels.txt"
-    kept.parent.mkdir(exist_ok=True)
-    with kept.with_suffix(".lock").open("w") as lock:
-        if fcntl is not None:  # other processes of this run wait, and find the list
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        before = kept.read_text(encoding="utf-8").splitlines() if kept.exists() else []
-        if before[:1] == [times] and all(map(os.path.exists, before[1:])):
-            return
-        command = [sys.executable, "-m", "objectmorpher.system.warm_up"]
-        subprocess.run(command, cwd=hands.ROOT, check=True)
-        found = [str(path) for folder in folders for path in folder.rglob("*.nbi")]
-        kept.write_text("\n".join([times, *sorted(found)]), encoding="utf-8")
+def compiled() -> None:
+    """The kernels are on the disk: who compiles them answers nobody for a minute or two."""
+    kernels.compile_kernels()
 
 
 @pytest.fixture
@@ -170,3 +146,12 @@ def window_environment(compiled: None, display: str, tmp_path: Path) -> dict[str
     """For a process with a window: its display, and settings of its own."""
     settings = 'dialogs = "built-in"\ngaussians = 3000\n'
     return hands.window_environment(display, tmp_path, settings)
+
+
+@pytest.fixture
+def without_networks(window_environment: dict[str, str], tmp_path: Path) -> dict[str, str]:
+    """As on a machine without weights, where it does not matter how well something is selected.
+
+    A window that opens a photo has its network look at it: most of what its test would cost.
+    """
+    return window_environment | {"OBJECTMORPHER_CACHE": str(tmp_path / "weights")}

@@ -1,7 +1,7 @@
 """Where the window's texts overlap or are cut off, read from what ImGui draws.
 
 `python tests/app/find_bad_texts.py` needs a display; it prints one line of JSON for each bad place,
-and nothing where all is well. Argument: WIDTHxHEIGHTxSCALE.
+and nothing where all is well. Arguments: WIDTHxHEIGHTxSCALE, of one window after the other.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +23,7 @@ from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Popup, ToolName
 from objectmorpher.gui.window.glfw_window import open_window
 from objectmorpher.gui.window.window import Window
+from objectmorpher_core.document.model import Document
 from shoot_views import made_document
 
 FRAMES = 4  # ImGui lays out in two; fades are off
@@ -100,11 +102,16 @@ def bad_places(atlas: int) -> Iterator[tuple[str, str, list[int]]]:
             yield "overlap", name, letters[k].astype(int).tolist()
 
 
+@cache
+def document() -> Document:
+    return made_document()
+
+
 def states(editor: Editor) -> Iterator[str]:
     """Puts the editor into one state after the other."""
     view = editor.view
     yield "start"
-    editor.start(made_document())
+    editor.start(document())
     for tool in ToolName:
         view.tool = tool
         yield tool.value
@@ -118,7 +125,13 @@ def states(editor: Editor) -> Iterator[str]:
 
 
 def main() -> None:
-    width, height, scale = sys.argv[1].split("x")
+    for size in sys.argv[1:]:
+        look(size)
+
+
+def look(size: str) -> None:
+    """Prints a line for each state of a window of this size."""
+    width, height, scale = size.split("x")
     options = WindowOptions(renderer="gl", size=(int(width), int(height)), scale=float(scale))
     window = Window(options, open_window(options))
     window.editor.settings = replace(window.editor.settings, motion="reduced")
@@ -131,7 +144,8 @@ def main() -> None:
         used = Counter(c.get_tex_id() for d in data.cmd_lists for c in d.cmd_buffer)
         atlas = used.most_common(1)[0][0]
         found = sum(len(own) for d in data.cmd_lists for own, _ in glyphs(d, atlas))
-        print(json.dumps({"state": state, "letters": found, "bad": list(bad_places(atlas))}))
+        bad = list(bad_places(atlas))
+        print(json.dumps({"size": size, "state": state, "letters": found, "bad": bad}))
     window.close()
 
 

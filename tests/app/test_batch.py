@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("lifted_once")
 
 MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)
-QUICK = {"mask": "mask.png", "gaussians": 300, "inpaint": "telea"}
+QUICK = {"mask": "mask.png", "gaussians": 300, "trust": 0, "inpaint": "telea"}
 
 
 @pytest.fixture

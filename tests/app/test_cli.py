@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("lifted_once")
 ROOT = Path(__file__).parents[2]
 MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)
-QUICK = ["--gaussians", "300", "--inpaint", "telea"]
+QUICK = ["--gaussians", "300", "--trust", "0", "--inpaint", "telea"]
 TURN = ["--turn", "20,0,0"]
 
 
@@ -286,7 +286,7 @@ def test_a_script_says_the_same_as_the_options(folder):
     script = {
         "handle": [{"at": [110, 62], "to": [120, 40], "dz": 0.1}], "pin": [[50, 62]],
         "turn": [10, -5, 0], "move": [3, 4], "scale": 0.9, "seed": 3, "mask": "mask.png",
-        "gaussians": 300, "inpaint": "telea",
+        "gaussians": 300, "trust": 0, "inpaint": "telea",
     }  # fmt: skip
     Path("edit.json").write_text(json.dumps(script))
     assert _edit(*options, out="a.png") == 0
@@ -313,7 +313,13 @@ def test_files_of_a_script_lie_beside_it(folder):
 
 def test_a_batch_edits_every_photo(folder):
     Path("other.png").write_bytes(shapes.png(PIXELS[::-1].copy()))
-    common = {"mask": "mask.png", "gaussians": 300, "inpaint": "telea", "turn": [20, 0, 0]}
+    common = {
+        "mask": "mask.png",
+        "gaussians": 300,
+        "trust": 0,
+        "inpaint": "telea",
+        "turn": [20, 0, 0],
+    }
     Path("batch.json").write_text(json.dumps([
         {"photo": "photo.png", "out": "a.png"} | common,
         {"photo": "other.png", "out": "b.png"} | common,
@@ -325,7 +331,7 @@ def test_a_batch_edits_every_photo(folder):
 
 
 def test_a_batch_of_which_one_fails_writes_none(folder, capsys):
-    common = {"mask": "mask.png", "gaussians": 300}
+    common = {"mask": "mask.png", "gaussians": 300, "trust": 0}
     Path("batch.json").write_text(json.dumps([
         {"photo": "photo.png", "out": "a.png"} | common,
         {"photo": "text.jpg", "out": "b.png"} | common,
@@ -474,7 +480,7 @@ SCRIPTS = {
     "empty batch": ("[]", "empty"),
     "batch without photos": ('[{"turn": [1, 2, 3]}, {"turn": [1, 2, 3]}]', "batch"),
     "batch of one name": (
-        '[{"photo": "photo.png", "out": "x.png", "mask": "mask.png", "gaussians": 300},'
+        '[{"photo": "photo.png", "out": "x.png", "mask": "mask.png", "gaussians": 300, "trust": 0},'
         ' {"photo": "photo.png", "out": "x.png", "mask": "mask.png", "gaussians": 300}]',
         "same name"),
 }  # fmt: skip

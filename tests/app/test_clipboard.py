@@ -103,11 +103,11 @@ def test_other_programs_cannot_break_it(display: str, monkeypatch: pytest.Monkey
 @pytest.mark.slow
 @pytest.mark.window
 def test_the_window_copies_and_pastes(
-    window_environment: dict[str, str], photo_path: Path, monkeypatch: pytest.MonkeyPatch
+    without_networks: dict[str, str], photo_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("DISPLAY", window_environment["DISPLAY"])
+    monkeypatch.setenv("DISPLAY", without_networks["DISPLAY"])
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with opened(window_environment, photo_path) as hands:
+    with opened(without_networks, photo_path) as hands:
         hands.place("Photo")
         clipboard.copy(png(30, 40))  # what is not ours yet
         hands.press("ctrl+c")

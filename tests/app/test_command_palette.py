@@ -68,9 +68,9 @@ def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Ed
 @pytest.mark.slow
 @pytest.mark.window
 def test_a_command_is_found_and_run_by_typing(
-    window_environment: dict[str, str], photo_path: Path
+    without_networks: dict[str, str], photo_path: Path
 ) -> None:
-    with opened(window_environment, photo_path) as hands:
+    with opened(without_networks, photo_path) as hands:
         hands.area("Photo")
         hands.press("ctrl+k")
         hands.area(SEARCH)

@@ -16,6 +16,7 @@ import trimesh
 from objectmorpher.cli import parser as cli
 from objectmorpher_core import pipeline
 from objectmorpher_core.pictures.image import read_picture
+from objectmorpher_core.scripting.animation import Clip
 from tests.core.lift.registered import two_sides
 from tests.photos import outlined
 
@@ -26,6 +27,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "howto").glob("*.md"))]
 RUN = ("edit", "select", "replay", "convert", "batch", "share")
 # A shadow that goes along, and a turn that shows much of what is invented.
 EXPECTED = re.compile(r"goes along with it|is removed|is guesswork")
+PICTURES = 10  # of each film, in place of 25 a second
 TWO = {
     "photo": "flower.jpg", "click": [[300, 190]], "move": [-60, 0],
     "objects": [{"click": [[90, 330]], "remove": True}],
@@ -86,6 +88,8 @@ def test_every_command_that_is_shown_runs_and_changes_what_it_says(tmp_path, mon
         return kept[key]
 
     monkeypatch.setattr(pipeline, "read_photo", once)
+    # The films' length is not what the pages show: `test_animation.py` looks at that.
+    monkeypatch.setattr(Clip, "count", PICTURES)
     shown = _shown()
     assert len(shown) >= 16
     for number, line in enumerate(shown):

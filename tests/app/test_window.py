@@ -52,11 +52,11 @@ def test_the_start_screen_is_drawn_and_stays_where_a_photo_is_broken(
 
 @pytest.mark.parametrize("renderer", quick(["gl", "tiles"], 1))
 def test_the_photo_is_shown_as_it_is(
-    window_environment: dict[str, str], photo_path: Path, tmp_path: Path, renderer: str
+    without_networks: dict[str, str], photo_path: Path, tmp_path: Path, renderer: str
 ) -> None:
     shot = tmp_path / "shot.png"
     arguments = ("--frames", "5", "--screenshot", str(shot), "--renderer", renderer)
-    result = run_app(window_environment, str(photo_path), *arguments)
+    result = run_app(without_networks, str(photo_path), *arguments)
     assert result.returncode == 0, result.stderr
     pixels, photo = np.asarray(Image.open(shot)), np.asarray(Image.open(photo_path))
     for x, y in ((20, 20), (90, 70), (150, 120)):
@@ -125,20 +125,23 @@ def test_the_whole_job_by_hand(hands: Hands, photo_path: Path, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_closing_asks_about_unsaved_changes(hands: Hands) -> None:
+def test_closing_asks_about_unsaved_changes(
+    without_networks: dict[str, str], photo_path: Path
+) -> None:
     """The whole job closes a photo by ctrl+w that nothing has changed."""
-    hands.click(*screen_xy(*CENTRE))
-    hands.wait(lambda: "edited" in hands.title(), "selecting")
-    for keys in ("ctrl+w", "ctrl+q"):
-        hands.press(keys)
-        time.sleep(0.4)
-        assert "edited" in hands.title()  # the question is there instead
-        hands.press("Escape")
-        time.sleep(0.3)
-    hands.press("ctrl+z")
-    hands.wait(lambda: "edited" not in hands.title(), "undoing")
-    hands.press("ctrl+q")
-    hands.wait(lambda: hands.title() == "", "closing")
+    with opened(without_networks, photo_path) as hands:
+        hands.click(*screen_xy(*CENTRE))
+        hands.wait(lambda: "edited" in hands.title(), "selecting")
+        for keys in ("ctrl+w", "ctrl+q"):
+            hands.press(keys)
+            time.sleep(0.4)
+            assert "edited" in hands.title()  # the question is there instead
+            hands.press("Escape")
+            time.sleep(0.3)
+        hands.press("ctrl+z")
+        hands.wait(lambda: "edited" not in hands.title(), "undoing")
+        hands.press("ctrl+q")
+        hands.wait(lambda: hands.title() == "", "closing")
 
 
 def test_without_a_screen_there_is_one_sentence(window_environment: dict[str, str]) -> None:

@@ -25,16 +25,16 @@ def is_warning(hands: Hands) -> bool:
 
 
 def test_a_killed_window_gives_its_work_back(
-    window_environment: dict[str, str], photo_path: Path, tmp_path: Path
+    without_networks: dict[str, str], photo_path: Path, tmp_path: Path
 ) -> None:
-    with opened(window_environment, photo_path) as hands:
+    with opened(without_networks, photo_path) as hands:
         hands.click(*screen_xy(*CENTRE))
         hands.wait(lambda: "edited" in hands.title(), "selecting")
         kept = tmp_path / "data" / "recovery"
         hands.wait(lambda: bool(list(kept.glob("*/document.json"))), "keeping")
     command = [sys.executable, "-m", "objectmorpher"]
-    with subprocess.Popen(command, env=window_environment, cwd=ROOT) as window:
-        hands = Hands(window_environment)
+    with subprocess.Popen(command, env=without_networks, cwd=ROOT) as window:
+        hands = Hands(without_networks)
         try:
             hands.wait(lambda: is_warning(hands), "offering")
             hands.click(*RECOVER)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from editor_steps import lift_ball
 from hands import ACCENT, opened
-from objectmorpher.editor.editor import Editor
+from objectmorpher_core.document.model import Document
 from objectmorpher_core.session.file import save_session
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
@@ -20,10 +19,9 @@ SHOT = "HINTING_SHOT"  # a file that the window's picture is written to, to be l
 
 
 def test_a_drag_over_the_background_says_from_where(
-    window_environment: dict[str, str], editor: Editor, tmp_path: Path
+    window_environment: dict[str, str], ball: Document, tmp_path: Path
 ) -> None:
     session = tmp_path / "ball.omorph"
-    ball = lift_ball(editor)
     save_session(ball, session)
     size, plate = ball.photo.size, ball.plate
     assert plate is not None

@@ -20,9 +20,9 @@ GONE = (20, -1.1)  # px of the photo that the handle is moved by
 
 
 @pytest.fixture
-def hands(window_environment: dict[str, str]) -> Iterator[Hands]:
+def hands(without_networks: dict[str, str]) -> Iterator[Hands]:
     """On the start screen."""
-    with opened(window_environment, None) as hands:
+    with opened(without_networks, None) as hands:
         yield hands
 
 

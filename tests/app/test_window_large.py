@@ -18,7 +18,8 @@ SIZE = (1440, 900)  # px of the screen: 720 x 450 points
 @pytest.fixture
 def large(display: str, tmp_path: Path) -> dict[str, str]:
     settings = 'dialogs = "built-in"\nscale = 2.0\nmotion = "reduced"\n'
-    return hands.window_environment(display, tmp_path, settings)
+    environment = hands.window_environment(display, tmp_path, settings)
+    return environment | {"OBJECTMORPHER_CACHE": str(tmp_path / "weights")}  # no network looks
 
 
 def check_all_inside(user: Hands) -> None:

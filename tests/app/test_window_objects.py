@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from editor_steps import lift_ball
 from hands import ACCENT, Hands, opened
 from objectmorpher.editor.editor import Editor
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session, save_session
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
@@ -44,10 +43,11 @@ def has_line(hands: Hands) -> bool:
 
 
 def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
-    window_environment: dict[str, str], editor: Editor, tmp_path: Path
+    window_environment: dict[str, str], editor: Editor, ball: Document, tmp_path: Path
 ) -> None:
     session = tmp_path / "balls.omorph"
-    two = edits.duplicate(lift_ball(editor), 0)
+    two = edits.duplicate(ball, 0)
+    editor.start(ball)
     save_session(edits.set_placement(two, 1, Placement(move=(50.0, 0.0))), session)
     size, scale = (editor.view.width, editor.view.height), editor.view.scale
     editor.view.resize((CANVAS[2], CANVAS[3]), 1.0, editor.photo_size)

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from editor_steps import lift_ball
 from hands import opened
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.gizmo import gizmo
+from objectmorpher_core.document.model import Document
 from objectmorpher_core.session.file import save_session
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
@@ -22,10 +22,11 @@ PLACE_TOOL = (10, 176)  # in the Place tool's button, beside its icon
 
 
 def test_turning_by_a_ring_and_going_back(
-    window_environment: dict[str, str], editor: Editor, tmp_path: Path
+    window_environment: dict[str, str], editor: Editor, ball: Document, tmp_path: Path
 ) -> None:
     session = tmp_path / "ball.omorph"
-    save_session(lift_ball(editor), session)
+    save_session(ball, session)
+    editor.start(ball)
     size, scale = (editor.view.width, editor.view.height), editor.view.scale
     editor.view.resize((CANVAS[2], CANVAS[3]), 1.0, editor.photo_size)
     editor.view.tool = ToolName.PLACE

@@ -34,8 +34,8 @@ def workers(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def hands(window_environment: dict[str, str], photo_path: Path, workers: Path) -> Iterator[Hands]:
-    with opened(window_environment | {worker_file.FOLDER: str(workers)}, photo_path) as hands:
+def hands(without_networks: dict[str, str], photo_path: Path, workers: Path) -> Iterator[Hands]:
+    with opened(without_networks | {worker_file.FOLDER: str(workers)}, photo_path) as hands:
         yield hands
 
 

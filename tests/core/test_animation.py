@@ -179,7 +179,7 @@ def test_a_pose_without_handles_comes_about_too():
 def keyed() -> list[np.ndarray]:
     """A film through four poses: at rest, dragged, dragged elsewhere, and turned only."""
     script = script_from({
-        "mask": "m.png", "gaussians": 300, "inpaint": "telea",
+        "mask": "m.png", "gaussians": 300, "trust": 0, "inpaint": "telea",
         "key": [
             {"handle": [{"at": [78, 45], "to": [90, 45]}], "pin": [[78, 80]]},
             {"handle": [{"at": [78, 45], "to": [66, 45]}], "pin": [[78, 80]]},

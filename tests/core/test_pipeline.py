@@ -32,7 +32,7 @@ MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)
 PHOTO, MASK_PNG = shapes.png(PIXELS), shapes.mask_png(MASK)
 HANDLE_PX = 1.0  # that a handle may end off its target
-QUICK = {"gaussians": 300, "inpaint": "telea"}
+QUICK = {"gaussians": 300, "trust": 0, "inpaint": "telea"}
 
 
 def _run(photo: bytes = PHOTO, mask: bytes = MASK_PNG, **options) -> Edited:

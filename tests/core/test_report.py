@@ -37,7 +37,7 @@ KEYS = {
 
 
 def _run(**options) -> Edited:
-    script = script_from({"gaussians": 300, "inpaint": "telea"} | options)
+    script = script_from({"gaussians": 300, "trust": 0, "inpaint": "telea"} | options)
     return run_script(shapes.png(shapes.picture(MASK)), "made.png", script, shapes.mask_png(MASK))
 
 

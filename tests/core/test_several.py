@@ -25,8 +25,8 @@ LEFT[:, 80:] = False
 RIGHT[:, :80] = False
 PIXELS = shapes.picture(PARTS)
 PHOTO = shapes.png(PIXELS)
-QUICK = {"gaussians": 300, "inpaint": "telea"}
-SMALL = {"gaussians": 300}  # of a further object
+QUICK = {"gaussians": 300, "trust": 0, "inpaint": "telea"}
+SMALL = {"gaussians": 300, "trust": 0}  # of a further object
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,9 @@
 """Compiles what the editor uses, so that nobody waits for it later.
 
-A checkout does it beforehand: `python -m objectmorpher.system.warm_up`. An installer's copy does it
-when it has been started for the first time, in a process of its own with the lowest priority, while
-the window is used already: what is asked for before it is ready is compiled there and then.
+A checkout does it beforehand, on several cores: `python -m objectmorpher.system.warm_up`. An
+installer's copy does it when it has been started for the first time, in a process of its own with
+the lowest priority, while the window is used already: what is asked for before it is ready is
+compiled there and then.
 """
 
 from __future__ import annotations
@@ -138,4 +139,7 @@ def _open(photo: Path | None) -> None:
 
 
 if __name__ == "__main__":
+    from objectmorpher_core.warm_up import compile_beside
+
+    compile_beside()
     warm_up()

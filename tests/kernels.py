@@ -1,0 +1,43 @@
+"""Compiles the kernels before the tests: `python -m tests.kernels`.
+
+Processes that begin together would compile the same ones. To load them all takes seconds: a list of
+them is kept until a source changes or one is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+from tests.tree import PYTHONPATH, ROOT
+
+try:
+    import fcntl
+except ImportError:
+    fcntl = None  # Windows has none
+
+FOLDERS = (ROOT / "objectmorpher_core", ROOT / "app" / "objectmorpher")
+KEPT = ROOT / ".pytest_cache" / "kernels.txt"
+
+
+def compile_kernels() -> None:
+    """A minute or two the first time; other processes that ask wait for it, and find the list."""
+    sources = sorted(path for folder in FOLDERS for path in folder.rglob("*.py"))
+    times = repr([(str(path), path.stat().st_mtime_ns) for path in sources])
+    KEPT.parent.mkdir(exist_ok=True)
+    with KEPT.with_suffix(".lock").open("w") as lock:
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        before = KEPT.read_text(encoding="utf-8").splitlines() if KEPT.exists() else []
+        if before[:1] == [times] and all(map(os.path.exists, before[1:])):
+            return
+        command = [sys.executable, "-m", "objectmorpher.system.warm_up"]
+        own = os.environ | {"PYTHONPATH": PYTHONPATH}
+        subprocess.run(command, cwd=ROOT, env=own, check=True)
+        found = [str(path) for folder in FOLDERS for path in folder.rglob("*.nbi")]
+        KEPT.write_text("\n".join([times, *sorted(found)]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    compile_kernels()
