@@ -139,7 +139,7 @@ class Chain:
         from objectmorpher_core.scripting.runner import has_left
 
         item = document.objects[0]
-        leaves = has_left(item)
+        leaves = has_left(item, document)
         if leaves not in self._plates:
             casting = frozenset({0}) if leaves else frozenset[int]()
             made = with_plate(document, EditScript(seed=self._seed), casting, silent).document
