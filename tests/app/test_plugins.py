@@ -110,6 +110,24 @@ def test_a_plugin_is_installed_with_the_way_to_this_program(host: str, tmp_path:
     assert door.command("a.png", "b.ora")[-3:] == ["a.png", "--return", "b.ora"]
 
 
+@pytest.mark.parametrize("host", ["krita", "blender"])
+def test_the_program_is_started_where_the_host_has_a_python_of_its_own(
+    host: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As Krita does it: its plug-ins, ours among them, come first on PYTHONPATH."""
+    assert main(["plugin", host, "--folder", str(tmp_path)]) == 0
+    door = module("door", tmp_path / "objectmorpher" / "door.py")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    monkeypatch.setenv("APPDIR", "/mounted")
+    monkeypatch.setenv("LD_LIBRARY_PATH", os.pathsep.join(("/mounted/usr/lib", "/opt/own/lib")))
+    command = [*door.program(), "--version"]
+    shadowed = subprocess.run(command, capture_output=True, text=True)
+    assert not shadowed.stdout.startswith("objectmorpher ")  # the plug-in has taken its name
+    said = subprocess.run(command, env=door.environment(), capture_output=True, text=True)
+    assert said.returncode == 0 and said.stdout.startswith("objectmorpher "), said.stderr
+    assert door.environment()["LD_LIBRARY_PATH"] == "/opt/own/lib"
+
+
 def test_a_folder_has_to_be_there_and_some_have_to_be_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -151,7 +169,7 @@ def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     layer = gimp.Layer(np.asarray(Image.open(edited / "photo.png").convert("RGBA")))
     image.insert_layer(layer, None, 0)
 
-    def program(command: list[str], check: bool) -> None:
+    def program(command: list[str], env: dict[str, str], check: bool) -> None:
         """What a user would do in the window."""
         photo, back = command[-3], command[-1]
         np.testing.assert_array_equal(pixels(Path(photo)), pixels(edited / "photo.png"))

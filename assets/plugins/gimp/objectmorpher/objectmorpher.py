@@ -66,7 +66,7 @@ def edit(procedure, run_mode, image, drawables, config, data):
         picture, back = Path(folder) / "layer.png", Path(folder) / "back.ora"
         send(image, drawables[0], picture)
         try:
-            subprocess.run(door.command(picture, back), check=False)
+            subprocess.run(door.command(picture, back), env=door.environment(), check=False)
         except OSError as error:
             return failed(procedure, f"ObjectMorpher could not be started: {error}")
         if back.exists():
