@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -267,6 +268,19 @@ app.queuePrompt(0, 1);
 CLOSE = "document.querySelectorAll('.p-dialog-mask, [role=dialog]').forEach((x) => x.remove())"
 
 
+def answers(address: str) -> None:
+    """Waits until a server does."""
+    end = time.monotonic() + 300
+    while True:
+        try:
+            with urllib.request.urlopen(address):
+                return
+        except OSError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(1.0)
+
+
 def comfyui() -> None:
     """ComfyUI: a graph of our nodes, carried out."""
     folder, python = Path(os.environ["COMFYUI"]), os.environ["COMFYUI_PYTHON"]
@@ -277,14 +291,14 @@ def comfyui() -> None:
     command = [python, "main.py", "--cpu", "--port", "8198", "--disable-api-nodes"]
     with subprocess.Popen(command, cwd=folder, env=environment) as server, opened_browser() as page:
         try:
-            time.sleep(6 * PAUSE)
+            answers("http://127.0.0.1:8198")
             page.resize(SIZE[0], SIZE[1] + 143)
             page.open("http://127.0.0.1:8198")
-            page.wait("window.app && app.graph && app.canvas", "opening")
+            page.wait("!!(window.app && app.graph && app.canvas)", "opening")
             time.sleep(PAUSE)
             page.run(CLOSE)
             page.run(LAID_OUT % (json.dumps(PLACES), json.dumps(GRAPH)))
-            page.wait("app.graph.getNodeById(6).imgs?.length", "rendering")
+            page.wait("app.graph.getNodeById(6).imgs?.length > 0", "rendering")
             time.sleep(PAUSE)
             page.run(CLOSE)
             time.sleep(1.0)
