@@ -302,7 +302,7 @@ def comfyui() -> None:
             time.sleep(PAUSE)
             page.run(CLOSE)
             time.sleep(1.0)
-            save(page.picture(), "comfyui")
+            save(page.picture()[:470], "comfyui")  # below, there is nothing
         finally:
             server.kill()
 
