@@ -1,8 +1,8 @@
 """Doors to other programs: the window sends layers back; Krita and ComfyUI's nodes take them.
 
-Krita and Blender (as the package bpy) are the real ones. ComfyUI hands its nodes tensors, which is
-done here. GIMP 3 is in no distribution that these tests run on, and Photoshop on no system: their
-plug-ins run against a stand-in for what they call.
+Krita, GIMP 3 and Blender (as the package bpy) are the real ones, where they are installed. ComfyUI
+hands its nodes tensors, which is done here. Where GIMP is older (Debian 12), and for Photoshop,
+which no system of ours has, the plug-ins run against a stand-in for what they call.
 """
 
 from __future__ import annotations
@@ -184,6 +184,57 @@ def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     assert np.abs(image.shown()[..., :3].astype(int) - pixels(edited / "edited.png")).max() <= 2
     refused = plugin.edit(gimp.Procedure(), None, image, [], None, None)
     assert refused[0] == gimp.PDBStatusType.EXECUTION_ERROR
+
+
+IN_GIMP = """
+import importlib.util, os, traceback
+from gi.repository import Gimp, Gio
+def run():
+    spec = importlib.util.spec_from_file_location("plugin", os.environ["PLUGIN"])
+    plugin = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(plugin)
+    quietly = Gimp.RunMode.NONINTERACTIVE
+    image = Gimp.file_load(quietly, Gio.File.new_for_path(os.path.abspath("photo.png")))
+    layer = image.get_layers()[0]
+    plugin.send(image, layer, os.path.abspath("sent.png"))
+    group = plugin.bring_back(image, layer, "back.ora")
+    names = [child.get_name() for child in group.get_children()]
+    image.flatten()
+    Gimp.file_save(quietly, image, Gio.File.new_for_path(os.path.abspath("shown.png")), None)
+    return names
+try:
+    said = "\\n".join(run())
+except BaseException:
+    said = traceback.format_exc()
+open("said-gimp.txt", "w").write(said)
+"""
+
+
+@pytest.mark.slow
+def test_the_real_gimp_sends_a_layer_and_shows_what_comes_back(
+    edited: Path, tmp_path: Path
+) -> None:
+    gimp = shutil.which("gimp-console-3.0")
+    if gimp is None:
+        pytest.skip("needs GIMP 3.0")
+    assert main(["plugin", "gimp", "--folder", str(tmp_path)]) == 0
+    shutil.copy(edited / "photo.png", tmp_path / "photo.png")
+    shutil.copy(edited / "back.ora", tmp_path / "back.ora")
+    plugin = str(tmp_path / "objectmorpher" / "objectmorpher.py")
+    environment = {**os.environ, "HOME": str(tmp_path), "PLUGIN": plugin}
+    for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "PYTHONPATH"):
+        environment.pop(name, None)
+    command = [gimp, "-i", "--batch-interpreter=python-fu-eval", "-b", IN_GIMP, "--quit"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, timeout=600, capture_output=True, text=True
+    )
+    said = tmp_path / "said-gimp.txt"
+    if not said.exists():
+        pytest.skip(f"GIMP has no Python here (python3-gi, gir1.2-gimp-3.0): {done.stderr[-300:]}")
+    assert said.read_text().splitlines()[-1] == "Photo", said.read_text()
+    np.testing.assert_array_equal(pixels(tmp_path / "sent.png"), pixels(edited / "photo.png"))
+    difference = np.abs(pixels(tmp_path / "shown.png") - pixels(edited / "edited.png"))
+    assert difference.max() <= 2, difference.max()
 
 
 IN_BLENDER = """
