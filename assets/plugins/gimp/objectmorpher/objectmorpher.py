@@ -16,9 +16,9 @@ import door  # noqa: E402
 
 PROCEDURE = "plug-in-objectmorpher"
 GROUP = "ObjectMorpher"
-MIXED = {  # GIMP mixes by these in encoded colours, as the file means it
-    "svg:multiply": "MULTIPLY_LEGACY", "svg:screen": "SCREEN_LEGACY",
-    "svg:soft-light": "SOFTLIGHT_LEGACY",
+MIXED = {  # GIMP mixes by these in encoded colours, as the file means it; else in linear light
+    "svg:src-over": "NORMAL_LEGACY", "svg:multiply": "MULTIPLY_LEGACY",
+    "svg:screen": "SCREEN_LEGACY", "svg:soft-light": "SOFTLIGHT_LEGACY",
 }  # fmt: skip
 
 
@@ -50,8 +50,7 @@ def bring_back(image, layer, path):
             loaded.set_name(name)
             loaded.set_offsets(left, top)
             loaded.set_visible(is_shown)
-            if how in MIXED:
-                loaded.set_mode(getattr(Gimp.LayerMode, MIXED[how]))
+            loaded.set_mode(getattr(Gimp.LayerMode, MIXED.get(how, MIXED["svg:src-over"])))
     image.undo_group_end()
     Gimp.displays_flush()
     return group
