@@ -19,17 +19,17 @@ from packaging.requirements import Requirement
 ROOT = Path(__file__).resolve().parents[1]
 LOCK = ROOT / "packaging" / "locks" / "run-time.txt"
 VERSION = "3.11"  # of Python, in all installers
-# What markers see on each system, and the newest tag that its oldest supported release can load.
+# What markers see on each system, and the tags of wheels that its oldest supported release loads.
 SYSTEMS = {
     "Windows, x86-64": ({"sys_platform": "win32", "platform_system": "Windows", "os_name": "nt",
                          "platform_machine": "AMD64"}, ["win_amd64"]),
     "macOS, arm64": ({"sys_platform": "darwin", "platform_system": "Darwin", "os_name": "posix",
                       "platform_machine": "arm64"},
-                     [f"macosx_{n}_0_{kind}" for n in range(15, 10, -1)
+                     [f"macosx_{n}_0_{kind}" for n in range(14, 10, -1)
                       for kind in ("arm64", "universal2")]),
     "macOS, x86-64": ({"sys_platform": "darwin", "platform_system": "Darwin", "os_name": "posix",
                        "platform_machine": "x86_64"},
-                      [f"macosx_{n}_{kind}" for n in ("15_0", "14_0", "13_0", "12_0", "11_0",
+                      [f"macosx_{n}_{kind}" for n in ("14_0", "13_0", "12_0", "11_0",
                                                       "10_15", "10_14", "10_13", "10_12", "10_9")
                        for kind in ("x86_64", "universal2", "intel")]),
     "Linux, aarch64": ({"sys_platform": "linux", "platform_system": "Linux", "os_name": "posix",

@@ -111,7 +111,21 @@ def test_the_manifests_of_winget_and_homebrew_hold_the_hashes_of_what_was_built(
     cask = (tmp_path / "objectmorpher.rb").read_text("utf-8")
     assert f'arm: "{hashes[names[1]]}"' in cask and f'intel: "{hashes[names[2]]}"' in cask
     assert 'arch arm: "arm64", intel: "x86_64"' in cask
+    assert "depends_on arch" not in cask
     assert len(re.findall(r"\bdo$", cask, re.M)) == len(re.findall(r"^end$", cask, re.M)) == 1
+
+
+def test_a_cask_of_one_image_says_for_which_macs_it_is(tmp_path: Path) -> None:
+    (tmp_path / "ObjectMorpher-9-arm64.dmg").write_bytes(b"for the test")
+    command = [sys.executable, ROOT / "packaging" / "store_files.py", tmp_path, "--address"]
+    subprocess.run([*command, "https://example.org/us/it"], check=True)
+    cask = (tmp_path / "objectmorpher.rb").read_text("utf-8")
+    assert "  depends_on arch: :arm64\n" in cask and "x86_64" not in cask
+    system = re.search(r'depends_on macos: ">= :(\w+)"', cask)
+    spec = (ROOT / "packaging" / "objectmorpher.spec").read_text("utf-8")
+    least = re.search(r'"LSMinimumSystemVersion": "(\d+)\.0"', spec)
+    assert system is not None and least is not None
+    assert {"monterey": "12", "ventura": "13", "sonoma": "14"}[system[1]] == least[1]
 
 
 def test_the_flatpaks_manifest_unpacks_the_debian_package(tmp_path) -> None:

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 FAULTS = {  # what stands in a workflow that is right, what is put there, what is then said
     "ubuntu-24.04": ("ubuntu-24.4", 'label "ubuntu-24.4" is unknown'),
-    "matrix.system": ("matrix.sistem", 'property "sistem" is not defined'),
+    "github.token": ("github.tokn", 'property "tokn" is not defined'),
     "needs: [python, ": ("needs: [pythn, ", 'job "pythn"'),
     "fetch-depth": ("depth", 'input "depth" is not defined'),
     "actions/checkout@v4": ("actions/checkout", "ref is missing"),
