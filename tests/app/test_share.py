@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from hands import ROOT
 from objectmorpher.__main__ import main
+from objectmorpher.server import share_page
 from objectmorpher.server.share_page import LONGEST, MOST_BYTES, joined
 from objectmorpher_core.session.file import save_session
 from tests import shapes
@@ -182,6 +183,16 @@ def test_a_page_of_24_megapixels_is_small_too(grain: int, tmp_path: Path) -> Non
     page = shared(photo, tmp_path)
     assert len(page) <= MOST_BYTES
     assert sides(page)[0] == LONGEST if not grain else sides(page)[0] <= LONGEST
+
+
+def test_a_page_that_is_too_large_is_compressed_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = shapes.scene("ellipse").document()
+    whole = share_page.encode_page(document, 0)
+    monkeypatch.setattr(share_page, "MOST_BYTES", len(whole) - 1)
+    smaller = share_page.encode_page(document, 0)
+    assert len(smaller) < len(whole) and sides(smaller) == sides(whole)
+    monkeypatch.setattr(share_page, "SMALLER", ((100, 80),))
+    assert max(sides(share_page.encode_page(document, 0))) == 100
 
 
 def test_parts_without_a_link_are_hung_on_the_nearest() -> None:
