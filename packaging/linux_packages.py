@@ -7,9 +7,12 @@ import platform
 import shutil
 import subprocess
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 HERE = Path(__file__).resolve().parent
 ID = "org.objectmorpher.ObjectMorpher"
+ADDRESS = "OBJECTMORPHER_REPOSITORY"  # environment variable: where the project is, once it is known
+LICENCE_LINE = "<project_license>Apache-2.0</project_license>"
 NAME = "objectmorpher"
 ICON_SIZES = (16, 24, 32, 48, 64, 128, 256)
 DEBIAN = {"x86_64": "amd64", "aarch64": "arm64"}
@@ -65,6 +68,10 @@ def place_desktop_files(share: Path) -> None:
         (f"{ID}.svg", "icons/hicolor/scalable/apps"),
     ):
         place(HERE / "linux" / source, share / folder / source)
+    if address := os.environ.get(ADDRESS):
+        metadata = share / "metainfo" / f"{ID}.metainfo.xml"
+        page = f'{LICENCE_LINE}\n  <url type="homepage">{escape(address)}</url>'
+        metadata.write_text(metadata.read_text("utf-8").replace(LICENCE_LINE, page), "utf-8")
     icon = Image.open(HERE.parent / "assets" / "icon.png").convert("RGBA")
     for size in ICON_SIZES:
         at = share / f"icons/hicolor/{size}x{size}/apps/{ID}.png"

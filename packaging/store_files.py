@@ -6,7 +6,7 @@ It writes three .yaml files (for a pull request to winget-pkgs), `objectmorpher.
 tap) and `org.objectmorpher.ObjectMorpher.yml` (for flatpak-builder, which unpacks the Debian
 package) into `dist`, with the hashes of the .msi, the .dmg files and the .deb that are there. The
 address is the repository's, with assets at ADDRESS/releases/download/vVERSION/. None was submitted
-yet, and flatpak-builder has not run.
+yet, and no Flatpak was built; flatpak-builder reads the manifest.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ cask "objectmorpher" do
   desc "{description}"
   homepage "{address}"
 
-  depends_on macos: ">= :monterey"
+  {needs}depends_on macos: ">= :sonoma"
 
   app "ObjectMorpher.app"
   binary "#{{appdir}}/ObjectMorpher.app/Contents/MacOS/objectmorpher"
@@ -144,6 +144,7 @@ def cask(images: list[Path], address: str, project: dict[str, str]) -> str:
     return CASK.format(
         version=project["version"], address=address, description=project["description"],
         arches=", ".join(f'{brew}: "{name}"' for brew, (name, _) in known.items()),
+        needs="" if len(known) > 1 else f"depends_on arch: :{found.popitem()[0]}\n  ",
         hashes=",\n         ".join(hashes) if len(hashes) > 1 else hashes[0].partition(" ")[2],
     )  # fmt: skip
 

@@ -47,6 +47,10 @@ class Browser:
             time.sleep(0.1)
         return value
 
+    def resize(self, width: int, height: int) -> None:
+        """The window's size, px, with what is around a page."""
+        self._ask("window/rect", {"width": width, "height": height})
+
     def drag(self, *places: tuple[float, float]) -> None:
         """Presses at the first place, css px of the window, and lets go at the last."""
         moves = [_move(*places[0]), {"type": "pointerDown", "button": 0}]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import configparser
 import hashlib
+import json
 import re
 import runpy
 import shutil
@@ -58,6 +59,18 @@ def test_sessions_have_a_type() -> None:
     assert glob.get("pattern") == f"*{SESSION_ENDING}"
 
 
+@pytest.mark.parametrize("address", [None, "https://example.org/us/it?a&b"])
+def test_the_metadata_name_the_projects_page_only_where_it_has_one(
+    address: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OBJECTMORPHER_REPOSITORY", raising=False)
+    if address:
+        monkeypatch.setenv("OBJECTMORPHER_REPOSITORY", address)
+    runpy.run_path(str(PACKAGES))["place_desktop_files"](tmp_path)
+    root = ElementTree.parse(tmp_path / "metainfo" / f"{ID}.metainfo.xml").getroot()
+    assert root.findtext("url[@type='homepage']") == address
+
+
 def test_the_metadata_tell_this_version_and_the_licence() -> None:
     root = ElementTree.parse(LINUX / f"{ID}.metainfo.xml").getroot()
     assert root.findtext("id") == ID
@@ -98,7 +111,21 @@ def test_the_manifests_of_winget_and_homebrew_hold_the_hashes_of_what_was_built(
     cask = (tmp_path / "objectmorpher.rb").read_text("utf-8")
     assert f'arm: "{hashes[names[1]]}"' in cask and f'intel: "{hashes[names[2]]}"' in cask
     assert 'arch arm: "arm64", intel: "x86_64"' in cask
+    assert "depends_on arch" not in cask
     assert len(re.findall(r"\bdo$", cask, re.M)) == len(re.findall(r"^end$", cask, re.M)) == 1
+
+
+def test_a_cask_of_one_image_says_for_which_macs_it_is(tmp_path: Path) -> None:
+    (tmp_path / "ObjectMorpher-9-arm64.dmg").write_bytes(b"for the test")
+    command = [sys.executable, ROOT / "packaging" / "store_files.py", tmp_path, "--address"]
+    subprocess.run([*command, "https://example.org/us/it"], check=True)
+    cask = (tmp_path / "objectmorpher.rb").read_text("utf-8")
+    assert "  depends_on arch: :arm64\n" in cask and "x86_64" not in cask
+    system = re.search(r'depends_on macos: ">= :(\w+)"', cask)
+    spec = (ROOT / "packaging" / "objectmorpher.spec").read_text("utf-8")
+    least = re.search(r'"LSMinimumSystemVersion": "(\d+)\.0"', spec)
+    assert system is not None and least is not None
+    assert {"monterey": "12", "ventura": "13", "sonoma": "14"}[system[1]] == least[1]
 
 
 def test_the_flatpaks_manifest_unpacks_the_debian_package(tmp_path) -> None:
@@ -139,6 +166,43 @@ def test_the_flatpaks_manifest_unpacks_the_debian_package(tmp_path) -> None:
     assert (app / "bin/objectmorpher").read_text() == "#!/bin/sh\n"
     for part in (f"applications/{ID}.desktop", f"metainfo/{ID}.metainfo.xml"):
         assert (app / "share" / part).is_file(), part
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        (f"{ID}.desktop", ("desktop-file-validate", "--warn-kde")),
+        (f"{ID}.metainfo.xml", ("appstreamcli", "validate", "--no-net")),
+    ],
+    ids=["entry", "metadata"],
+)
+def test_the_desktops_own_tools_take_the_files(
+    name: str, options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As they are in the packages of a project that has an address."""
+    if shutil.which(options[0]) is None:
+        pytest.skip(f"{options[0]} is not installed")
+    monkeypatch.setenv("OBJECTMORPHER_REPOSITORY", "https://example.org/us/it?a&b")
+    runpy.run_path(str(PACKAGES))["place_desktop_files"](tmp_path)
+    (path,) = tmp_path.rglob(name)
+    done = subprocess.run([*options, path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_flatpak_builder_reads_the_manifest(tmp_path: Path) -> None:
+    """It says again all that it has understood: no word of the manifest is lost on it."""
+    yaml = pytest.importorskip("yaml")
+    if shutil.which("flatpak-builder") is None:
+        pytest.skip("flatpak-builder is not installed")
+    (tmp_path / "objectmorpher_9_all.deb").write_bytes(b"for the test")
+    command = [sys.executable, ROOT / "packaging" / "store_files.py", tmp_path, "--address"]
+    subprocess.run([*command, "https://example.org/us/it"], check=True)
+    show = ["flatpak-builder", "--show-manifest", f"{ID}.yml"]
+    done = subprocess.run(show, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    meant = yaml.safe_load((tmp_path / f"{ID}.yml").read_text("utf-8"))
+    assert meant["modules"][0]["build-options"].pop("strip") is False  # as it is anyway
+    assert json.loads(done.stdout) == meant
 
 
 def test_the_workflows_run_what_there_is_on_three_systems() -> None:

@@ -87,6 +87,26 @@ def test_the_research_package_is_apart(installed, tmp_path):
 
 
 @pytest.mark.slow
+def test_both_packages_are_typed(installed, tmp_path):
+    """The marks are in the wheel, and pyright takes the types of what is installed."""
+    files = run(installed / "python", "-m", "pip", "show", "--files", "objectmorpher", cwd=tmp_path)
+    for package in ("objectmorpher", "objectmorpher_core"):
+        assert f"  {package}/py.typed" in files.splitlines()
+    (tmp_path / "use.py").write_text(
+        "import objectmorpher_core as om\n"
+        "from objectmorpher.cli.plugin import usual_folder\n"
+        "a: str = om.open('photo.jpg')\n"
+        "b: str = usual_folder(3)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "pyright", "--pythonpath", installed / "python", "use.py"],
+        cwd=tmp_path, env=clean(), capture_output=True, text=True,
+    )  # fmt: skip
+    said = [line for line in done.stdout.splitlines() if " - error: " in line]
+    assert sorted(re.findall(r"use\.py:(\d+)", "".join(said))) == ["3", "4", "4"], done.stdout
+
+
+@pytest.mark.slow
 def test_every_resource_is_inside(installed, tmp_path):
     names = [
         path.relative_to(ROOT).as_posix()

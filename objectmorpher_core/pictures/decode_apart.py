@@ -87,7 +87,9 @@ def main() -> None:
     if sys.platform == "linux":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        _, allowed = resource.getrlimit(resource.RLIMIT_AS)  # by the user's own `ulimit -v`
+        limit = MEMORY if allowed == resource.RLIM_INFINITY else min(MEMORY, allowed)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     kind, most = sys.argv[1], int(sys.argv[2])
     try:
         samples, icc, block = READERS[kind](sys.stdin.buffer.read(), most)

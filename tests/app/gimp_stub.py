@@ -21,6 +21,7 @@ class Layer:
         self.pixels, self.name, self.offsets, self.is_visible = pixels, name, (0, 0), True
         self.children: list[Layer] = []
         self.image: Image | None = None
+        self.mode = "NORMAL"  # which mixes in linear light
 
     @staticmethod
     def new_from_drawable(layer: Layer, image: Image) -> Layer:
@@ -44,6 +45,9 @@ class Layer:
 
     def set_offsets(self, x: int, y: int) -> None:
         self.offsets = (x, y)
+
+    def set_mode(self, mode: str) -> None:
+        self.mode = mode
 
     def set_visible(self, is_visible: bool) -> None:
         self.is_visible = is_visible
@@ -86,12 +90,18 @@ class Image:
 
     def shown(self) -> np.ndarray:
         """(H, W, 4) u8 all layers over each other."""
-        canvas = Picture.new("RGBA", (self.width, self.height))
+        canvas = np.zeros((self.height, self.width, 4))
         flat = [part for layer in self.layers for part in (layer.children or [layer])]
         for layer in reversed(flat):
             if layer.is_visible and layer.pixels is not None:
-                canvas.alpha_composite(Picture.fromarray(layer.pixels), layer.offsets)
-        return np.asarray(canvas)
+                (x, y), (h, w) = layer.offsets, layer.pixels.shape[:2]
+                power = 2.2 if layer.mode == "NORMAL" else 1.0  # about that of sRGB
+                below, above = canvas[y : y + h, x : x + w], layer.pixels / 255
+                alpha = above[..., 3:]
+                mixed = alpha * above[..., :3] ** power + (1 - alpha) * below[..., :3] ** power
+                below[..., :3] = mixed ** (1 / power)
+                below[..., 3:] = alpha + (1 - alpha) * below[..., 3:]
+        return np.rint(canvas * 255).astype(np.uint8)
 
 
 class Procedure:
@@ -113,6 +123,10 @@ def make_gimp(monkeypatch: pytest.MonkeyPatch) -> Any:
             np.asarray(Picture.open(file).convert("RGBA"))
         ),
         displays_flush=lambda: None,
+        LayerMode=types.SimpleNamespace(
+            NORMAL_LEGACY="NORMAL_LEGACY", MULTIPLY_LEGACY="MULTIPLY_LEGACY",
+            SCREEN_LEGACY="SCREEN_LEGACY", SOFTLIGHT_LEGACY="SOFTLIGHT_LEGACY",
+        ),
     )  # fmt: skip
     gimp.PlugIn = type("PlugIn", (), {"error_quark": staticmethod(lambda: 1)})
     gio = types.SimpleNamespace(File=types.SimpleNamespace(new_for_path=lambda path: path))

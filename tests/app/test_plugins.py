@@ -1,8 +1,8 @@
 """Doors to other programs: the window sends layers back; Krita and ComfyUI's nodes take them.
 
-Krita and Blender (as the package bpy) are the real ones. ComfyUI hands its nodes tensors, which is
-done here. GIMP 3 is in no distribution that these tests run on, and Photoshop on no system: their
-plug-ins run against a stand-in for what they call.
+Krita, GIMP 3 and Blender (as the package bpy) are the real ones, where they are installed. ComfyUI
+hands its nodes tensors, which is done here. Where GIMP is older (Debian 12), and for Photoshop,
+which no system of ours has, the plug-ins run against a stand-in for what they call.
 """
 
 from __future__ import annotations
@@ -110,6 +110,24 @@ def test_a_plugin_is_installed_with_the_way_to_this_program(host: str, tmp_path:
     assert door.command("a.png", "b.ora")[-3:] == ["a.png", "--return", "b.ora"]
 
 
+@pytest.mark.parametrize("host", ["krita", "blender"])
+def test_the_program_is_started_where_the_host_has_a_python_of_its_own(
+    host: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As Krita does it: its plug-ins, ours among them, come first on PYTHONPATH."""
+    assert main(["plugin", host, "--folder", str(tmp_path)]) == 0
+    door = module("door", tmp_path / "objectmorpher" / "door.py")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    monkeypatch.setenv("APPDIR", "/mounted")
+    monkeypatch.setenv("LD_LIBRARY_PATH", os.pathsep.join(("/mounted/usr/lib", "/opt/own/lib")))
+    command = [*door.program(), "--version"]
+    shadowed = subprocess.run(command, capture_output=True, text=True)
+    assert not shadowed.stdout.startswith("objectmorpher ")  # the plug-in has taken its name
+    said = subprocess.run(command, env=door.environment(), capture_output=True, text=True)
+    assert said.returncode == 0 and said.stdout.startswith("objectmorpher "), said.stderr
+    assert door.environment()["LD_LIBRARY_PATH"] == "/opt/own/lib"
+
+
 def test_a_folder_has_to_be_there_and_some_have_to_be_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -151,7 +169,7 @@ def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     layer = gimp.Layer(np.asarray(Image.open(edited / "photo.png").convert("RGBA")))
     image.insert_layer(layer, None, 0)
 
-    def program(command: list[str], check: bool) -> None:
+    def program(command: list[str], env: dict[str, str], check: bool) -> None:
         """What a user would do in the window."""
         photo, back = command[-3], command[-1]
         np.testing.assert_array_equal(pixels(Path(photo)), pixels(edited / "photo.png"))
@@ -166,6 +184,57 @@ def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     assert np.abs(image.shown()[..., :3].astype(int) - pixels(edited / "edited.png")).max() <= 2
     refused = plugin.edit(gimp.Procedure(), None, image, [], None, None)
     assert refused[0] == gimp.PDBStatusType.EXECUTION_ERROR
+
+
+IN_GIMP = """
+import importlib.util, os, traceback
+from gi.repository import Gimp, Gio
+def run():
+    spec = importlib.util.spec_from_file_location("plugin", os.environ["PLUGIN"])
+    plugin = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(plugin)
+    quietly = Gimp.RunMode.NONINTERACTIVE
+    image = Gimp.file_load(quietly, Gio.File.new_for_path(os.path.abspath("photo.png")))
+    layer = image.get_layers()[0]
+    plugin.send(image, layer, os.path.abspath("sent.png"))
+    group = plugin.bring_back(image, layer, "back.ora")
+    names = [child.get_name() for child in group.get_children()]
+    image.flatten()
+    Gimp.file_save(quietly, image, Gio.File.new_for_path(os.path.abspath("shown.png")), None)
+    return names
+try:
+    said = "\\n".join(run())
+except BaseException:
+    said = traceback.format_exc()
+open("said-gimp.txt", "w").write(said)
+"""
+
+
+@pytest.mark.slow
+def test_the_real_gimp_sends_a_layer_and_shows_what_comes_back(
+    edited: Path, tmp_path: Path
+) -> None:
+    gimp = shutil.which("gimp-console-3.0")
+    if gimp is None:
+        pytest.skip("needs GIMP 3.0")
+    assert main(["plugin", "gimp", "--folder", str(tmp_path)]) == 0
+    shutil.copy(edited / "photo.png", tmp_path / "photo.png")
+    shutil.copy(edited / "back.ora", tmp_path / "back.ora")
+    plugin = str(tmp_path / "objectmorpher" / "objectmorpher.py")
+    environment = {**os.environ, "HOME": str(tmp_path), "PLUGIN": plugin}
+    for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "PYTHONPATH"):
+        environment.pop(name, None)
+    command = [gimp, "-i", "--batch-interpreter=python-fu-eval", "-b", IN_GIMP, "--quit"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, timeout=600, capture_output=True, text=True
+    )
+    said = tmp_path / "said-gimp.txt"
+    if not said.exists():
+        pytest.skip(f"GIMP has no Python here (python3-gi, gir1.2-gimp-3.0): {done.stderr[-300:]}")
+    assert said.read_text().splitlines()[-1] == "Photo", said.read_text()
+    np.testing.assert_array_equal(pixels(tmp_path / "sent.png"), pixels(edited / "photo.png"))
+    difference = np.abs(pixels(tmp_path / "shown.png") - pixels(edited / "edited.png"))
+    assert difference.max() <= 2, difference.max()
 
 
 IN_BLENDER = """

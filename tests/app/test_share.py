@@ -17,13 +17,14 @@ from scipy.sparse.csgraph import connected_components
 
 from hands import ROOT
 from objectmorpher.__main__ import main
-from objectmorpher.server.share_page import joined
+from objectmorpher.server import share_page
+from objectmorpher.server.share_page import LONGEST, MOST_BYTES, joined
 from objectmorpher_core.session.file import save_session
 from tests import shapes
 from tests.browser import Browser, opened_browser
 
 PHOTO = ROOT / "assets" / "samples" / "flower.jpg"
-MOST_BYTES = 8 << 20
+SAMPLES = sorted((ROOT / "assets" / "samples").glob("*.jpg"))
 CANVAS = "document.getElementById('canvas')"
 ALIKE = 2.0 / 255  # mean difference of two pictures: the page's are WebP files
 
@@ -142,6 +143,56 @@ def test_a_double_click_releases_a_point(page: Browser) -> None:
     page.double_click(place)
     assert page.run("return objectmorpher.thing.handles.length") == 0
     page.run("document.getElementById('reset').click(); return 0")
+
+
+def shared(photo: Path, folder: Path) -> bytes:
+    """The page of a photo's subject, which was turned."""
+    session, page = folder / f"{photo.stem}.omorph", folder / f"{photo.stem}.html"
+    told = ["--subject", "--turn", "12,0,0", "--session", str(session)]
+    assert main(["edit", str(photo), "-o", str(folder / "edited.png"), *told]) == 0
+    assert main(["share", str(session), "-o", str(page)]) == 0
+    return page.read_bytes()
+
+
+def sides(page: bytes) -> tuple[int, int]:
+    """Width and height of the photo in a page, px."""
+    found = re.search(rb'"size":\[(\d+),(\d+)\]', page)
+    assert found is not None
+    return int(found[1]), int(found[2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("photo", SAMPLES, ids=lambda path: path.stem)
+def test_pages_of_the_samples_are_small_and_whole(photo: Path, tmp_path: Path) -> None:
+    page = shared(photo, tmp_path)
+    assert 100_000 < len(page) <= MOST_BYTES == 8_000_000
+    assert sides(page) == Image.open(photo).size
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("grain", [0, 30])  # of 255: none, and more than WebP can make small
+def test_a_page_of_24_megapixels_is_small_too(grain: int, tmp_path: Path) -> None:
+    wide = Image.open(PHOTO).resize((6000, 4000), Image.Resampling.BICUBIC)
+    pixels = np.asarray(wide).astype(np.float32)
+    if grain:  # as large as a px of the page, which reducing the photo would take away otherwise
+        coarse = np.random.default_rng(1).normal(0, 1, (1067, 1600, 3)).astype(np.float32)
+        coarse = coarse.repeat(4, 0).repeat(4, 1)[:4000, :6000]
+        pixels[:, : coarse.shape[1]] += 2 * grain * coarse
+    photo = tmp_path / "large.jpg"
+    Image.fromarray(np.clip(pixels, 0, 255).astype(np.uint8)).save(photo, quality=95)
+    page = shared(photo, tmp_path)
+    assert len(page) <= MOST_BYTES
+    assert sides(page)[0] == LONGEST if not grain else sides(page)[0] <= LONGEST
+
+
+def test_a_page_that_is_too_large_is_compressed_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = shapes.scene("ellipse").document()
+    whole = share_page.encode_page(document, 0)
+    monkeypatch.setattr(share_page, "MOST_BYTES", len(whole) - 1)
+    smaller = share_page.encode_page(document, 0)
+    assert len(smaller) < len(whole) and sides(smaller) == sides(whole)
+    monkeypatch.setattr(share_page, "SMALLER", ((100, 80),))
+    assert max(sides(share_page.encode_page(document, 0))) == 100
 
 
 def test_parts_without_a_link_are_hung_on_the_nearest() -> None:

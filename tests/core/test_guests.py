@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from skimage import data
 from objectmorpher_core.pictures.guests import kind_of
 from objectmorpher_core.pictures.image import ImageError, Picture, encode_picture, read_picture
 from tests.raw_photos import dng
+from tests.tree import PYTHONPATH
 
 FILES = Path(__file__).parent / "files"  # written by libheif from scikit-image's cat
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
@@ -39,6 +42,30 @@ def test_a_phones_photo_is_upright_and_keeps_profile_and_focal_length() -> None:
     assert picture.exif is not None
     written = encode_picture(picture, ".png")
     np.testing.assert_array_equal(read_picture(written).pixels, picture.pixels)  # not turned again
+
+
+UNDER_A_LIMIT = """
+import resource, sys
+from pathlib import Path
+from objectmorpher_core.pictures.image import read_picture
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+for path in sys.argv[1:]:
+    print(*read_picture(Path(path).read_bytes()).pixels.shape)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux limits the decoder")
+def test_the_decoder_keeps_to_a_lower_limit_of_memory(tmp_path: Path) -> None:
+    """As a shell's `ulimit -v` or a batch system sets it: it cannot be raised again."""
+    jxl, raw = tmp_path / "a.jxl", tmp_path / "a.dng"
+    jxl.write_bytes(encode_picture(Picture(data.chelsea()[:60, :80]), ".jxl"))
+    raw.write_bytes(dng(np.full((24, 36, 3), 0.5)))
+    done = subprocess.run(
+        [sys.executable, "-c", UNDER_A_LIMIT, FILES / "cat-10-bit.heic", jxl, raw],
+        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": PYTHONPATH},
+    )  # fmt: skip
+    assert done.stdout.splitlines()[:2] == ["60 80 3", "60 80 3"], done.stderr[-2000:]
+    assert len(done.stdout.splitlines()) == 3, done.stderr[-2000:]
 
 
 def test_ten_bits_come_in_as_sixteen() -> None:

@@ -73,7 +73,8 @@ class Damage:
             (begins(b"\x1f\x8b"), self._gzip), (begins(b"\x93NUMPY"), self._npy),
             (begins(b"{", b"["), self._json), (begins(b"ply", b"OFF", b"solid"), self._head),
             (begins(b"RIFF"), self._riff), (begins(b"glTF"), self._glb),
-            (begins(b"\xff\xd8"), self._jpeg),
+            (begins(b"\xff\xd8"), self._jpeg), (begins(b"8BPS"), self._psd),
+            (lambda data: data[4:8] in (b"ftyp", b"JXL "), self._boxes),
             (lambda data: data[4:10] == b"\0\0\0\0{\"", self._safetensors),
             (_is_text, self._text),
         ]  # fmt: skip
@@ -353,6 +354,39 @@ class Damage:
         markers[k] = markers[k][0], self._bytes(markers[k][1])[:65000]
         head = b"".join(bytes([255, m]) + (len(b) + 2).to_bytes(2, "big") + b for m, b in markers)
         return data[:2] + head + data[at:]
+
+    def _boxes(self, data: bytes) -> bytes:
+        """JPEG XL, HEIC and AVIF: a box damaged, dropped, doubled or renamed; lengths right."""
+        boxes, at = [], 0
+        while at + 8 <= len(data):
+            length = int.from_bytes(data[at : at + 4], "big") or len(data) - at
+            boxes.append((data[at + 4 : at + 8], data[at + 8 : at + length]))
+            at += max(length, 8)
+        k, way = self._random.randrange(len(boxes)), self._random.random()
+        kind, body = boxes[k]
+        if way < 0.6:
+            boxes[k] = kind, self._bytes(body)
+        elif way < 0.7:
+            del boxes[k]
+        elif way < 0.8:
+            boxes.insert(self._random.randrange(len(boxes) + 1), boxes[k])
+        elif way < 0.9:
+            boxes[k] = self._random.choice(boxes)[0], body
+        else:
+            boxes.insert(k, (b"Exif", bytes(4) + EXIF))
+        return b"".join((8 + len(b)).to_bytes(4, "big") + t + b for t, b in boxes)
+
+    def _psd(self, data: bytes) -> bytes:
+        """Photoshop: one of the three sections damaged, its length right."""
+        sections, at = [], 26
+        for _ in range(3):
+            length = int.from_bytes(data[at : at + 4], "big")
+            sections.append(data[at + 4 : at + 4 + length])
+            at += 4 + length
+        k = self._random.randrange(3)
+        sections[k] = self._bytes(sections[k])
+        parts = b"".join(len(s).to_bytes(4, "big") + s for s in sections)
+        return data[:26] + parts + data[at:]
 
     def _glb(self, data: bytes) -> bytes:
         length = int.from_bytes(data[12:16], "little")

@@ -18,6 +18,7 @@ from objectmorpher_core.pictures.image import (
     read_coverage,
     read_picture,
 )
+from objectmorpher_core.pictures.psd import Layer, encode_psd
 from objectmorpher_core.pipeline import open_photo
 from tests.raw_photos import dng
 
@@ -112,6 +113,50 @@ def read(data: bytes, folder: Path) -> None:
     assert kept is not None, "no format takes it"
 
 
+def jxl_seeds() -> list[bytes]:
+    """JPEG XL as the program writes it, and of other depths, channels and containers."""
+    import pylibjxl
+
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    pixels, alpha = noise(HEIGHT, WIDTH, 3), noise(HEIGHT, WIDTH)
+    smooth = np.array(Image.fromarray(pixels[:6, :8]).resize((WIDTH * 4, HEIGHT * 4)))
+    pictures = [Picture(pixels), Picture(pixels, alpha, icc=profile, exif=EXIF), Picture(smooth)]
+    pictures.append(Picture(np.repeat(alpha[..., None], 3, 2), is_grey=True, exif=EXIF))
+    found = [encode_picture(p, ".jxl", webp_quality=q) for p in pictures for q in (100, 80)]
+    for samples, options in (
+        (noise(HEIGHT, WIDTH, 3, deep=True), {"lossless": True}),
+        (noise(HEIGHT, WIDTH, 4, deep=True), {"distance": 2.0, "icc": profile}),
+        (noise(HEIGHT, WIDTH, 1), {"lossless": True}),
+        (noise(HEIGHT, WIDTH, 3), {"effort": 1, "exif": EXIF, "xmp": b"<x:xmpmeta/>"}),
+        (noise(HEIGHT, WIDTH, 4), {"effort": 9, "lossless": True}),
+        (noise(1, 1, 3), {}),
+    ):
+        found.append(pylibjxl.encode(samples, **options))
+    return found
+
+
+def psd_seeds() -> list[bytes]:
+    """Photoshop files, which are written and not read: flat, layered, raw, RLE, 8 and 16 bits."""
+    from psd_tools import PSDImage
+    from psd_tools.constants import Compression
+
+    found = []
+    for deep in (False, True):
+        pixels, alpha = noise(HEIGHT, WIDTH, 3, deep=deep), noise(HEIGHT, WIDTH, deep=deep)
+        whole = np.dstack([pixels, alpha])
+        layers = [Layer("Photo", pixels), Layer("Object 1", whole[3:19, 2:29], 2, 3)]
+        layers.append(Layer("Shadow", whole[5:9], 0, 5, is_shown=False, mode="multiply"))
+        for merged in (Picture(pixels, exif=EXIF), Picture(pixels, alpha)):
+            found += [encode_psd([], merged), encode_psd(layers, merged)]
+    for mode in ("RGB", "RGBA", "L", "CMYK"):
+        for packed in (Compression.RAW, Compression.RLE):
+            photo = Image.fromarray(noise(HEIGHT, WIDTH, 3)).convert(mode)
+            out = io.BytesIO()
+            PSDImage.frompil(photo, compression=packed).save(out)
+            found.append(out.getvalue())
+    return found
+
+
 def mask_seeds() -> list[bytes]:
     return [encode_picture(Picture(noise(HEIGHT, WIDTH, 3)), ending) for ending in (".png", ".tif")]
 
@@ -143,6 +188,8 @@ def read_exif(data: bytes, folder: Path) -> None:
 
 READERS = [
     Reader("photo", seeds, read, share=4),
+    Reader("jxl", jxl_seeds, read, share=0.5),
+    Reader("psd", psd_seeds, read, share=0.25),
     Reader("mask", mask_seeds, read_mask, share=0.5),
     Reader("exif", exif_seeds, read_exif),
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +12,9 @@ import pytest
 from tests.fuzz.__main__ import fuzz
 from tests.fuzz.damage import Damage
 from tests.fuzz.readers import by_name, readers
+from tests.tree import PYTHONPATH
+
+ROOT = Path(__file__).parents[2]
 
 FOUND = Path(__file__).parent / "found"  # files that once did worse
 SLOW = ("drawn-session",)  # what is drawn has to be compiled first
@@ -37,6 +42,38 @@ def test_many_damaged_files_of_every_reader() -> None:
     everything = [reader.name for reader in readers()]
     tally = fuzz(everything, "slow", MANY, 1800.0, keep=None)
     assert list(tally.found) == []
+
+
+WHOLE = """
+import sys
+from pathlib import Path
+from tests.fuzz.child import MEMORY, bound, failure
+from tests.fuzz.readers import by_name
+names = sys.argv[2:]
+pools = {name: by_name(name).seeds() for name in names}
+before = {n: [failure(by_name(n), d, Path(sys.argv[1])) for d in pools[n]] for n in names}
+bound(MEMORY)
+for name in names:
+    for k, data in enumerate(pools[name]):
+        after = failure(by_name(name), data, Path(sys.argv[1]))
+        print(name, k, "same" if after == before[name][k] else after)
+        print(name, "read" if after == "" else "refused")
+"""
+
+
+@pytest.mark.slow
+def test_whole_pictures_are_read_within_the_limits(tmp_path: Path) -> None:
+    """Or the damaged ones would be refused for want of memory, and nothing of them tried."""
+    names = ("photo", "jxl", "psd")
+    done = subprocess.run(
+        [sys.executable, "-c", WHOLE, tmp_path, *names], capture_output=True, text=True, cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": PYTHONPATH},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    said = done.stdout.splitlines()
+    assert [line for line in said if len(line.split()) > 2 and not line.endswith("same")] == []
+    assert {"photo read", "jxl read", "psd refused"} <= set(said)
+    assert not {"photo refused", "jxl refused", "psd read"} & set(said)
 
 
 def test_the_same_seed_gives_the_same_file() -> None:

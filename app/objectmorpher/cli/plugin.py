@@ -29,6 +29,7 @@ FOLDERS = {
     "blender": "PATH/TO/blender/VERSION/extensions/user_default",
 }  # fmt: skip
 EXECUTABLE = 0o755
+PYTHONS = ("PYTHONPATH", "PYTHONHOME")  # of the program, not of the one that starts it: door.py
 
 
 def add_plugin(parser: argparse.ArgumentParser) -> None:
@@ -69,7 +70,9 @@ def plugin_files(host: str) -> dict[str, bytes]:
     frozen = getattr(sys, "frozen", False)
     command = [sys.executable] if frozen else [sys.executable, "-P", "-m", "objectmorpher"]
     files["objectmorpher/door.py"] = (source / "door.py").read_bytes()
-    files["objectmorpher/objectmorpher.json"] = json.dumps({"command": command}).encode()
+    own = {name: os.environ.get(name) for name in PYTHONS}
+    beside = {"command": command, "environment": own}
+    files["objectmorpher/objectmorpher.json"] = json.dumps(beside).encode()
     return files
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import logging
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -38,33 +39,59 @@ from objectmorpher_core.raster.rules import SPLATTINGS
 
 from ..system.resources import resource
 
+log = logging.getLogger(__name__)
+
 LONGEST = 1600  # px, of the photo in the page
 MOST = 24_000  # Gaussians
 QUALITY = 92  # of WebP
+MOST_BYTES = 8_000_000  # of a page
+SMALLER = ((LONGEST, 80), (1280, 80), (1024, 75), (800, 70))  # px and quality, where it has more
 JOINTS = 4  # links of a part that has none
 PARTS = ("arap.js", "splat.vert", "splat.frag", "resolve.frag", "view.js")
 
 
 def encode_page(document: Document, index: int) -> bytes:
-    """Return the page in which object `index` can be dragged; the others are as they were left."""
+    """Return the page in which object `index` can be dragged; the others are as they were left.
+
+    A page of more than MOST_BYTES gets a photo that is compressed more, and then a smaller one.
+    """
     item, photo = document.objects[index], document.photo
-    lifted, matte = item.shown, item.matte
-    assert lifted is not None and matte is not None, "the caller checks"
-    scale = min(LONGEST / max(photo.size), 1.0)
-    width, height = (max(round(side * scale), 1) for side in photo.size)
+    lifted = item.shown
+    assert lifted is not None and item.matte is not None, "the caller checks"
     puppet = puppet_of(item, photo.camera)
     body = thinned(lifted, MOST)
-    arrays = _arrays(lifted if body is None else body[0], puppet, scale)
+    shown = lifted if body is None else body[0]
+    plate = to_u8(_background(document, index))
+    page = _page(document, index, puppet, shown, plate, LONGEST, QUALITY)
+    for longest, quality in SMALLER:
+        if len(page) <= MOST_BYTES:
+            break
+        log.info("A page of %d bytes is too large: %d px, quality %d", len(page), longest, quality)
+        page = _page(document, index, puppet, shown, plate, longest, quality)
+    return page
+
+
+def _page(
+    document: Document, index: int, puppet: Puppet, shown: LiftedObject, plate: np.ndarray,
+    longest: int, quality: int,
+) -> bytes:  # fmt: skip
+    """The page with a photo of at most `longest` px, whose WebP files have that `quality`."""
+    item, photo = document.objects[index], document.photo
+    matte = item.matte
+    assert matte is not None
+    scale = min(longest / max(photo.size), 1.0)
+    width, height = (max(round(side * scale), 1) for side in photo.size)
+    arrays = _arrays(shown, puppet, scale)
     arrays |= _graph(puppet, item.pose)
     about, data = _packed(arrays)
     about |= _places(document, index, puppet, scale)
     side = tuple(max(round(n * scale), 1) for n in reversed(matte.alpha.shape))
     foreground = np.rint(np.clip(resized(matte.shown, *side), 0, 1) * 255).astype(np.uint8)
     alpha = np.rint(np.clip(resized(matte.alpha, *side), 0, 1) * 255).astype(np.uint8)
-    plate = resized(to_u8(_background(document, index)), width, height)
     values = {
         "title": html.escape(Path(photo.name).stem), "width": str(width), "height": str(height),
-        "foreground": _image(_webp(foreground)), "plate": _image(_webp(plate)),
+        "foreground": _image(_webp(foreground, quality)),
+        "plate": _image(_webp(resized(plate, width, height), quality)),
         "matte": _image(encode_coverage(alpha), "png"),
         "about": json.dumps(about, separators=(",", ":")).replace("<", "\\u003c"),
         "data": base64.b64encode(data).decode(),
@@ -180,8 +207,8 @@ def _bytes(values: np.ndarray) -> np.ndarray:
     return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
-def _webp(pixels: np.ndarray) -> bytes:
-    return encode_picture(Picture(pixels), ".webp", webp_quality=QUALITY)
+def _webp(pixels: np.ndarray, quality: int) -> bytes:
+    return encode_picture(Picture(pixels), ".webp", webp_quality=quality)
 
 
 def _image(data: bytes, kind: str = "webp") -> str:

@@ -36,7 +36,9 @@ def replay(session, folder, places=None, saved=None):
     if saved is not None:
         words += ["--save-session", str(saved)]
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            words, env=door.environment(), capture_output=True, text=True, check=False
+        )
     except OSError as error:
         raise RuntimeError(f"ObjectMorpher could not be started: {error}") from error
     if done.returncode:

@@ -16,9 +16,9 @@ import door  # noqa: E402
 
 PROCEDURE = "plug-in-objectmorpher"
 GROUP = "ObjectMorpher"
-MIXED = {  # GIMP mixes by these in encoded colours, as the file means it
-    "svg:multiply": "MULTIPLY_LEGACY", "svg:screen": "SCREEN_LEGACY",
-    "svg:soft-light": "SOFTLIGHT_LEGACY",
+MIXED = {  # GIMP mixes by these in encoded colours, as the file means it; else in linear light
+    "svg:src-over": "NORMAL_LEGACY", "svg:multiply": "MULTIPLY_LEGACY",
+    "svg:screen": "SCREEN_LEGACY", "svg:soft-light": "SOFTLIGHT_LEGACY",
 }  # fmt: skip
 
 
@@ -50,8 +50,7 @@ def bring_back(image, layer, path):
             loaded.set_name(name)
             loaded.set_offsets(left, top)
             loaded.set_visible(is_shown)
-            if how in MIXED:
-                loaded.set_mode(getattr(Gimp.LayerMode, MIXED[how]))
+            loaded.set_mode(getattr(Gimp.LayerMode, MIXED.get(how, MIXED["svg:src-over"])))
     image.undo_group_end()
     Gimp.displays_flush()
     return group
@@ -66,7 +65,7 @@ def edit(procedure, run_mode, image, drawables, config, data):
         picture, back = Path(folder) / "layer.png", Path(folder) / "back.ora"
         send(image, drawables[0], picture)
         try:
-            subprocess.run(door.command(picture, back), check=False)
+            subprocess.run(door.command(picture, back), env=door.environment(), check=False)
         except OSError as error:
             return failed(procedure, f"ObjectMorpher could not be started: {error}")
         if back.exists():

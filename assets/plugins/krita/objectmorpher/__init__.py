@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from krita import Extension, InfoObject, Krita
-from PyQt5.QtCore import QProcess, QRect
+from PyQt5.QtCore import QProcess, QProcessEnvironment, QRect
 from PyQt5.QtWidgets import QMessageBox
 
 from . import door
@@ -82,15 +82,24 @@ class ObjectMorpher(Extension):
             return self._say("The layer could not be saved.")
         first, *rest = door.command(picture, back)
         process = QProcess()
-        process.finished.connect(lambda *_: self._finish(process, folder, document, node, back))
+        own = QProcessEnvironment()
+        for name, value in door.environment().items():
+            own.insert(name, value)
+        process.setProcessEnvironment(own)
+        process.finished.connect(
+            lambda code, _: self._finish(code, process, folder, document, node, back)
+        )
         process.errorOccurred.connect(lambda *_: self._say(f"{first} could not be started."))
         self._processes.append(process)
         process.start(first, rest)
 
-    def _finish(self, process, folder, document, node, back):
+    def _finish(self, code, process, folder, document, node, back):
         self._processes.remove(process)
         if back.exists():
             bring_back(document, node, back)
+        elif code != 0:
+            said = bytes(process.readAllStandardError()).decode(errors="replace").splitlines()
+            self._say(said[-1] if said else "ObjectMorpher ended without a word.")
         folder.cleanup()
 
     def _say(self, text):
