@@ -20,6 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # those of PyTorch wait busily fo
 
 import numpy as np
 
+from objectmorpher_core import segment
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.models.early_answers import EarlyAnswers
 from objectmorpher_core.segment import dino_tokens, salience
@@ -52,6 +53,14 @@ def afresh(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(remembered.FOLDER)
     for module in (dino_tokens, salience):
         monkeypatch.setattr(module, "_early", EarlyAnswers(module.KEPT))
+
+
+@pytest.fixture(scope="session")
+def networks() -> None:
+    """The weights with which things are selected are here; a test that needs them is left out."""
+    for name in ("dino", "subject"):
+        if (reason := segment.load(name).missing()) is not None:
+            pytest.skip(reason)
 
 
 _known: dict[bytes, tuple[Any, ...]] = {}  # what `lifted_once` remembers: see `_remembering`

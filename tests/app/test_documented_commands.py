@@ -74,6 +74,7 @@ def _laid_out(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("networks")
 def test_every_command_that_is_shown_runs_and_changes_what_it_says(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     _laid_out(tmp_path)

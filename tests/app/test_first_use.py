@@ -16,7 +16,7 @@ from hands import ROOT, Hands, opened
 from tests.faults import network
 from tests.faults.tracer import missing
 
-pytestmark = [pytest.mark.window, pytest.mark.slow]
+pytestmark = [pytest.mark.window, pytest.mark.slow, pytest.mark.usefixtures("networks")]
 
 MOST = 12  # clicks and drags from the start screen to the exported photo
 AROUND = (slice(100, 280), slice(290, 420))  # rows and columns of the photo around the nose

@@ -67,7 +67,7 @@ def pixels(path: Path) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def edited(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def edited(networks: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a photo, the same edited, and the layers that come back of it."""
     folder = tmp_path_factory.mktemp("door")
     Image.open(FLOWER).save(folder / "photo.png")

@@ -102,6 +102,7 @@ def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor, ball: Do
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("networks")
 def test_a_kind_is_a_step_the_worker_makes_it_and_a_session_keeps_it(
     editor: Editor, ball: Document
 ) -> None:

@@ -30,7 +30,7 @@ ALIKE = 2.0 / 255  # mean difference of two pictures: the page's are WebP files
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(networks: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A flower that was turned and bent, its session, its picture and its page."""
     folder = tmp_path_factory.mktemp("share")
     told = ["--subject", "--handle", "384,192:420,170", "--turn", "12,0,0"]
@@ -162,6 +162,7 @@ def sides(page: bytes) -> tuple[int, int]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("networks")
 @pytest.mark.parametrize("photo", SAMPLES, ids=lambda path: path.stem)
 def test_pages_of_the_samples_are_small_and_whole(photo: Path, tmp_path: Path) -> None:
     page = shared(photo, tmp_path)
@@ -170,6 +171,7 @@ def test_pages_of_the_samples_are_small_and_whole(photo: Path, tmp_path: Path) -
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("networks")
 @pytest.mark.parametrize("grain", [0, 30])  # of 255: none, and more than WebP can make small
 def test_a_page_of_24_megapixels_is_small_too(grain: int, tmp_path: Path) -> None:
     wide = Image.open(PHOTO).resize((6000, 4000), Image.Resampling.BICUBIC)
