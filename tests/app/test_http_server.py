@@ -7,6 +7,7 @@ import json
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from http import HTTPStatus
 
 import pytest
@@ -56,7 +57,8 @@ def _asked(server: HttpServer, length: str, body: bytes, path: str) -> tuple[int
         connection.putrequest("POST", path)
         connection.putheader("Content-Length", length)
         connection.endheaders(body)
-        connection.sock.shutdown(socket.SHUT_WR)
+        with suppress(OSError):  # the server may have closed it already, which shows below
+            connection.sock.shutdown(socket.SHUT_WR)
         response = connection.getresponse()
         return response.status, json.loads(response.read())
     finally:
