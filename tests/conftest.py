@@ -57,7 +57,7 @@ def afresh(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def networks() -> None:
-    """The weights with which things are selected are here; a test that needs them is left out."""
+    """Leaves a test out where the weights with which things are selected are not installed."""
     for name in ("dino", "subject"):
         if (reason := segment.load(name).missing()) is not None:
             pytest.skip(reason)

@@ -10,12 +10,8 @@ import os
 import subprocess
 import sys
 
+from tests.alone import alone
 from tests.tree import PYTHONPATH, ROOT
-
-try:
-    import fcntl
-except ImportError:
-    fcntl = None  # Windows has none
 
 FOLDERS = (ROOT / "objectmorpher_core", ROOT / "app" / "objectmorpher")
 KEPT = ROOT / ".pytest_cache" / "kernels.txt"
@@ -26,9 +22,7 @@ def compile_kernels() -> None:
     sources = sorted(path for folder in FOLDERS for path in folder.rglob("*.py"))
     times = repr([(str(path), path.stat().st_mtime_ns) for path in sources])
     KEPT.parent.mkdir(exist_ok=True)
-    with KEPT.with_suffix(".lock").open("w") as lock:
-        if fcntl is not None:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+    with alone(KEPT.with_suffix(".lock")):
         before = KEPT.read_text(encoding="utf-8").splitlines() if KEPT.exists() else []
         if before[:1] == [times] and all(map(os.path.exists, before[1:])):
             return

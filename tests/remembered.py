@@ -11,8 +11,7 @@ import hashlib
 import os
 import pickle
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,11 +20,7 @@ import numpy as np
 from objectmorpher_core.base.arrays import F32, RGB
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.segment import dino_tokens, salience
-
-try:
-    import fcntl
-except ImportError:
-    fcntl = None  # Windows has none: there, two processes may compute the same
+from tests.alone import alone
 
 FOLDER = "OBJECTMORPHER_TESTS_REMEMBER"  # the variable that names it
 
@@ -43,22 +38,13 @@ def once(said: bytes, compute: Callable[[], Value]) -> Value:
         return compute()
     path = Path(folder) / hashlib.sha256(said).hexdigest()
     if not path.exists():
-        with _alone(path.with_suffix(".lock")):
+        with alone(path.with_suffix(".lock")):
             if not path.exists():
                 found = compute()
                 _keep(found, path)
                 return found
     body, *arrays = pickle.loads(path.read_bytes())
     return pickle.loads(body, buffers=arrays)
-
-
-@contextmanager
-def _alone(lock: Path) -> Iterator[None]:
-    """Only one process at a time is here; a process that ends lets the next one in."""
-    with lock.open("w") as file:
-        if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
 
 
 def _keep(found: object, path: Path) -> None:

@@ -209,14 +209,17 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
     return turned(placement, turn_of(matrix), points, lifted, camera, gimbal.down)
 
 
-def keeps_foot(item: EditObject, document: Document) -> bool:
-    """Whether the foot of what stands is where it is in the photo, however it is turned."""
-    if item.lifted is None or not item.lifted.stands:
-        return item.placement.move == (0, 0) and item.placement.depth == 0
-    lifted, down = item.lifted, gimbal_of(item, document).down
+def is_in_place(item: EditObject, document: Document) -> bool:
+    """Whether it stands where it does in the photo, however it is turned there."""
+    placement, lifted = item.placement, item.lifted
+    if placement.move == (0, 0) and placement.depth == 0:
+        return True
+    if lifted is None or not lifted.stands:
+        return False
     points = lifted.world_points(lifted.body.means)
-    foot = foot_of(item.placement, points, lifted, document.photo.camera, down)
-    off = np.linalg.norm(foot - _still(points, lifted, down))
+    foot = _still(points, lifted, gimbal_of(item, document).down)
+    motion = placement.matrix(lifted, document.photo.camera)
+    off = np.linalg.norm(motion[:3, :3] @ foot + motion[:3, 3] - foot)
     return bool(off < STILL * lifted.diameter * lifted.scale)
 
 

@@ -32,7 +32,7 @@ from ..document.model import (
     Placement,
     Prompt,
 )
-from ..document.placement import keeps_foot, set_seen_from, spun
+from ..document.placement import is_in_place, set_seen_from, spun
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
@@ -392,13 +392,12 @@ def _note(item: EditObject, has_gone: bool) -> str:
 def has_left(item: EditObject, document: Document) -> bool:
     """Whether it is not where its shadow in the photo is.
 
-    Turned, spun and bent it still stands there: a spun solid's shadow is nearer to the one in the
+    Turned, spun and bent it still stands there: its true shadow is then nearer to the one in the
     photo than to any that can be made.
     """
-    place = item.placement
-    if not item.is_visible or place.scale != 1:
+    if not item.is_visible or item.placement.scale != 1:
         return True
-    return (place.move != (0, 0) or place.depth != 0) and not keeps_foot(item, document)
+    return not is_in_place(item, document)
 
 
 def _hints(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:

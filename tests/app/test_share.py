@@ -193,7 +193,7 @@ def test_a_page_that_is_too_large_is_compressed_more(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(share_page, "MOST_BYTES", len(whole) - 1)
     smaller = share_page.encode_page(document, 0)
     assert len(smaller) < len(whole) and sides(smaller) == sides(whole)
-    monkeypatch.setattr(share_page, "SMALLER", ((100, 80),))
+    monkeypatch.setattr(share_page, "SIZES", (share_page.SIZES[0], (100, 80)))
     assert max(sides(share_page.encode_page(document, 0))) == 100
 
 

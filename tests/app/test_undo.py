@@ -114,9 +114,7 @@ def test_a_snapshot_is_gone_back_to_as_a_step(editor: Editor, ball: Document) ->
 
 @pytest.mark.window
 @pytest.mark.slow
-def test_every_control_of_every_panel_is_undone(
-    without_networks: dict[str, str],
-) -> None:
+def test_every_control_of_every_panel_is_undone(without_networks: dict[str, str]) -> None:
     """Each is clicked and dragged in the real window, in each tool and in what a tool unfolds."""
     command = [sys.executable, "tests/app/flip_controls.py"]
     said = subprocess.run(

@@ -119,7 +119,7 @@ def test_another_task_is_computed_anew() -> None:
 @pytest.mark.parametrize("options", [
     {"lift": "triposplat"}, {"inpaint": "nothing"},
 ], ids=lambda options: next(iter(options)))  # fmt: skip
-def test_it_is_not_begun_where_it_would_be_heavy_wrong_or_impossible(
+def test_it_is_not_begun_where_it_would_be_heavy_or_impossible(
     options: dict[str, object],
 ) -> None:
     wanted = script(**{"move": [5, 5]} | options)

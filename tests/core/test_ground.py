@@ -23,7 +23,7 @@ from objectmorpher_core.document.placement import (
     foot_of,
     gimbal_of,
     ground_under,
-    keeps_foot,
+    is_in_place,
     scaled,
     spun,
     turned,
@@ -215,10 +215,10 @@ def test_a_spin_turns_what_stands_on_its_foot_about_its_upright(scene, up, degre
     foot = 0.5 * (own.min(0) + own.max(0))
     np.testing.assert_allclose(*([*m[:3] @ [*foot, 1.0]] for m in (before, after)), atol=EXACT)
     in_place = replace(thing, placement=spun(Placement(turn=turn), degrees, thing, document))
-    assert keeps_foot(in_place, document) == (turn == (0.0, 0.0, 0.0))
+    assert is_in_place(in_place, document) == (turn == (0.0, 0.0, 0.0))
     x, y = in_place.placement.move
     moved = replace(in_place.placement, move=(x + 0.5, y))
-    assert not keeps_foot(replace(in_place, placement=moved), document)
+    assert not is_in_place(replace(in_place, placement=moved), document)
     np.testing.assert_allclose(after[:3, :3] @ down, before[:3, :3] @ down, atol=EXACT)
     spin = np.linalg.inv(before[:3, :3]) @ after[:3, :3]
     assert np.degrees(turn_about(vector_from_matrix(spin), down)) == pytest.approx(degrees)

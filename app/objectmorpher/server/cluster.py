@@ -32,7 +32,6 @@ UPSCALE = 1.0  # s that calls wait before another process is started: someone wa
 LOOK_BACK = 3.0  # s over which Ray Serve averages how many wait
 DOWNSCALE = 300.0  # s: a model that was loaded is soon wanted again
 HEALTH = 2.0  # s between two looks at each process
-READY = 50.0  # s that a proxy may take to start on a busy machine; Ray Serve gives up after 60
 
 
 @dataclass(frozen=True)
@@ -100,12 +99,11 @@ class Cluster:
         serve.start(
             proxy_location="EveryNode",
             http_options={"host": host, "port": port, "keep_alive_timeout_s": int(IDLE)},
-            controller_options={"runtime_env": {"env_vars": {
-                **proxy_environment(door.token, door.limits),
-                "RAY_SERVE_PROXY_READY_CHECK_TIMEOUT_S": str(READY),
-            }}},
+            controller_options={
+                "runtime_env": {"env_vars": proxy_environment(door.token, door.limits)}
+            },
             logging_config={"log_level": "WARNING"},
-        )  # fmt: skip
+        )
         site, handles = look_there(plan.cpus).of(plan.stages), {}
         for packing in _packings(plan, site):
             log.info("%s: %s", ", ".join(packing.stages), _told(packing))

@@ -42,6 +42,8 @@ App = Callable[[Event, Receive, Send], Awaitable[None]]
 
 ADMISSION = "OBJECTMORPHER_ADMISSION"  # environment variable of the proxies
 CALLBACK = "RAY_SERVE_HTTP_PROXY_CALLBACK_IMPORT_PATH"  # Ray Serve calls it there
+PATIENCE = "RAY_SERVE_PROXY_READY_CHECK_TIMEOUT_S"
+READY = 50.0  # s that a proxy may take to start on a busy machine; Ray Serve gives up after 60
 LAST = {"type": "http.response.body", "body": b""}
 
 
@@ -83,11 +85,16 @@ class Gate:
 
 
 def proxy_environment(token: str, limits: RequestLimits) -> dict[str, str]:
-    """Variables by which Ray Serve's proxies get a gate. The token itself is not among them."""
+    """Variables for Ray Serve's proxies: their gate, and the time that they have to start.
+
+    The token itself is not among them.
+    """
     told = {
         "token": fingerprint(token).hex(), "body": limits.body, "requests": limits.connections,
     }  # fmt: skip
-    return {ADMISSION: json.dumps(told), CALLBACK: f"{__name__}:{gates.__name__}"}
+    return {
+        ADMISSION: json.dumps(told), CALLBACK: f"{__name__}:{gates.__name__}", PATIENCE: str(READY),
+    }  # fmt: skip
 
 
 def gates() -> list[Any]:

@@ -43,9 +43,9 @@ log = logging.getLogger(__name__)
 
 LONGEST = 1600  # px, of the photo in the page
 MOST = 24_000  # Gaussians
-QUALITY = 92  # of WebP
 MOST_BYTES = 8_000_000  # of a page
-SMALLER = ((LONGEST, 80), (1280, 80), (1024, 75), (800, 70))  # px and quality, where it has more
+# Longest side of the photo, px, and quality of WebP, until a page has no more bytes.
+SIZES = ((LONGEST, 92), (LONGEST, 80), (1280, 80), (1024, 75), (800, 70))
 JOINTS = 4  # links of a part that has none
 PARTS = ("arap.js", "splat.vert", "splat.frag", "resolve.frag", "view.js")
 
@@ -62,12 +62,12 @@ def encode_page(document: Document, index: int) -> bytes:
     body = thinned(lifted, MOST)
     shown = lifted if body is None else body[0]
     plate = to_u8(_background(document, index))
-    page = _page(document, index, puppet, shown, plate, LONGEST, QUALITY)
-    for longest, quality in SMALLER:
+    page = b""
+    for longest, quality in SIZES:
+        page = _page(document, index, puppet, shown, plate, longest, quality)
         if len(page) <= MOST_BYTES:
             break
-        log.info("A page of %d bytes is too large: %d px, quality %d", len(page), longest, quality)
-        page = _page(document, index, puppet, shown, plate, longest, quality)
+        log.info("A page of %d bytes is too large", len(page))
     return page
 
 

@@ -155,7 +155,7 @@ def test_requests_beyond_the_limit_are_refused_and_places_come_back(front: Liste
         return False
 
     def is_full() -> bool:
-        if has_place():  # which the question itself may have taken from one of those that are held
+        if has_place():  # perhaps the last question took the place of one that was to hold it
             hold()
             return False
         return True
