@@ -40,6 +40,7 @@ from .document.model import (
     Prompt,
 )
 from .document.settings import Hint
+from .lift.beyond_frame import cut_out_beyond
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
 from .lift.registration.other_photo import OtherPhoto, with_photo
 from .lift.relief.depth_look import look_at_all
@@ -119,7 +120,7 @@ def lift_mask(
     """
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
-    matte = cut_out(pixels, mask, mixed)
+    matte = cut_out_beyond(pixels, mask, mixed)
     if use_matte is not None:
         use_matte(matte)
     subject = lift.LiftSubject(pixels, camera, is_selected(mask), matte)
@@ -490,7 +491,7 @@ def _lift_all_round(
         raise ScriptError(f"more_views: the lifter {script.lift} makes a shape from one photo")
     photo, mask = document.photo, document.objects[k].selection
     assert mask is not None, "it was chosen"
-    matte, lifted = cut_out(photo.pixels, mask), None
+    matte, lifted = cut_out_beyond(photo.pixels, mask), None
     subject = lift.LiftSubject(photo.pixels, photo.camera, is_selected(mask), matte)
     count = len(script.more_views)
     for number, wanted in enumerate(script.more_views):

@@ -38,8 +38,9 @@ from ..document.paint import Paint
 from ..document.pose import Base, Pose
 from ..document.sides import Sides
 from ..segment.mask_edit import as_coverage, is_selected
-from ..segment.matting.matte import REACH, band_width, cut_out
+from ..segment.matting.matte import REACH, band_width
 from . import LiftError, LiftSubject, load
+from .beyond_frame import cut_out_beyond
 from .registration.imported import ImportTarget, rematted
 from .relief.spreading import BRIM
 
@@ -400,7 +401,7 @@ def refit_object(
     if not changed.any():
         return was.matte, was.lifted
     away = cv2.distanceTransform((~changed).astype(np.uint8), cv2.DIST_L2, 5)
-    matte = _blended(was.matte, cut_out(scene.pixels, scene.mask, scene.mixed), away)
+    matte = _blended(was.matte, cut_out_beyond(scene.pixels, scene.mask, scene.mixed), away)
     camera, lifted = scene.camera, was.lifted
     if lifted.middle is None:
         shown = rematted(lifted, matte, camera, seed)

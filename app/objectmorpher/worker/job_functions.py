@@ -172,11 +172,11 @@ def lift_with_photo(
     Of a file it is the main subject. `chosen`: the segmenter, and the lifter.
     """
     from objectmorpher_core.lift import LiftSubject, load
+    from objectmorpher_core.lift.beyond_frame import cut_out_beyond
     from objectmorpher_core.lift.registration.other_photo import with_photo
     from objectmorpher_core.pictures.image import ImageError
     from objectmorpher_core.pipeline import other_photo
     from objectmorpher_core.segment.mask_edit import is_selected
-    from objectmorpher_core.segment.matting.matte import cut_out
 
     segmenter, choice = chosen
     if isinstance(other, Path):
@@ -184,7 +184,7 @@ def lift_with_photo(
             other = other_photo(other, None, segmenter, part(progress, 0.0, 0.2), None, choice.seed)
         except OSError as error:
             raise ImageError(f"{other.name} cannot be opened: {error.strerror or error}") from error
-    matte = cut_out(cut.pixels, cut.mask, cut.mixed)
+    matte = cut_out_beyond(cut.pixels, cut.mask, cut.mixed)
     subject = LiftSubject(cut.pixels, cut.camera, is_selected(cut.mask), matte)
     settings, lifted = with_photo(
         subject, shape, load(choice.backend), other, part(progress, 0.2, 0.95), choice.seed

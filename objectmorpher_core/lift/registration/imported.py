@@ -26,10 +26,10 @@ from ...deform.control_points import COUNT, sample_control_points
 from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, Matte, PhotoTexture
 from ...segment.mask_edit import is_selected
-from ...segment.matting.matte import cut_out
 from ...splat_files import COUNT as MESH_COUNT
 from ...splat_files import read_object
 from .. import LiftError
+from ..beyond_frame import cut_out_beyond
 from ..relief.canvas import bilinear
 from ..relief.colours import BLUR, in_light
 from ..relief.lifter import TANGENT_SIGMA
@@ -115,7 +115,7 @@ def place_import(
     The document's camera must become `proposal.camera`. Raises LiftError.
     """
     progress(0.0, "Cutting out the object")
-    matte = cut_out(scene.pixels, scene.mask, scene.mixed)
+    matte = cut_out_beyond(scene.pixels, scene.mask, scene.mixed)
     rest = part(progress, 0.4, 1.0)
     return matte, lift_imported(gaussians, proposal, matte, progress=rest, seed=seed)
 
