@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -20,7 +21,7 @@ from ...document.settings import Hint, Shadow
 from .. import Inpainter
 from ..plate.plate import Box, build_plate, cut, hole_margin, overlap
 from ..silhouette import cells_bounds, sampled
-from .shadow import GAMMA
+from .shadow import FROM_ABOVE, GAMMA
 
 # Across a shadow's edge: lit ground there looks as beside it, at every distance from the edge.
 #
@@ -147,6 +148,38 @@ def evened(lit: F32, missing: F32, free: Mask, pitch: float) -> F32:
     return np.asarray(np.clip(lit * factor, 0, 1), np.float32)
 
 
+def calmed(lit: F32, missing: F32, free: Mask) -> F32:
+    """The picture `lit` (h, w, 3) in [0, 1] without the blotches that deep shade hid.
+
+    A JPEG file keeps colours in coarse steps. Where much light was given back, by `missing` (h, w),
+    they are seen: colours come from more of the ground there, as far as that looks the same. And
+    noise has grown: what is fine there has no more contrast than on lit ground.
+    """
+    share = np.clip((missing - CALM[0]) / (CALM[1] - CALM[0]), 0, 1)[..., None]
+    if not share.any():
+        return lit
+    grey = np.asarray(cv2.transform(lit, THIRDS), np.float32)
+    around = (free & (missing > CALM[0])).astype(np.float32)
+    guide = cv2.GaussianBlur(grey, (0, 0), CALM_GUIDE)
+    known = cv2.ximgproc.guidedFilter(guide, around, CALM_REACH, CALM_EPS)
+    off = cv2.ximgproc.guidedFilter(
+        guide, (lit - grey[..., None]) * around[..., None], CALM_REACH, CALM_EPS
+    )
+    even = _as_grainy(grey, missing, free)[..., None]
+    even = even + off / np.maximum(known, LEAST_KNOWN)[..., None]
+    return np.asarray(np.clip(lit + share * (even - lit), 0, 1), np.float32)
+
+
+def _as_grainy(grey: F32, missing: F32, free: Mask) -> F32:
+    """(h, w) `grey` with no more fine contrast in deep shade than on lit ground beside it."""
+    fine = grey - cv2.GaussianBlur(grey, (0, 0), CALM_GUIDE)
+    usual, own = free & (missing < LIT), free & (missing > CALM[1])
+    if not usual.any() or not own.any():
+        return grey
+    most, has = (float(np.median(np.abs(fine[part]))) for part in (usual, own))
+    return np.asarray(grey - max(1 - most / max(has, 1e-6), 0.0) * fine, np.float32)
+
+
 def _factor(lit: F32, missing: F32, free: Mask, pitch: float) -> F32:
     """(h, w, 3) what `evened` multiplies light by."""
     away = _from_edge(missing, pitch)
@@ -216,11 +249,17 @@ def _mean(picture: F32, weight: F32, sigma: float) -> F32:
     return np.asarray(total / np.maximum(share, 1e-6)[..., None], np.float32)
 
 
+CALM = 0.7, 1.6  # natural logarithm of missing light, from which colours are smooth, and wholly so
+CALM_REACH, CALM_EPS = 16, 0.003  # px: two blocks of a JPEG file; how much brighter is no edge
+CALM_GUIDE = 2.0  # px, over which that is measured
+LEAST_KNOWN = np.float32(0.05)
+EDGE_PX, EDGE_CELLS = 2.0, 0.15  # px and cells: half the width of a hard edge, which is invented
+SPECK = 7  # px
+EDGE_WIDTH = 1.2  # px: the first px on either side
 LOST = 1.1  # natural logarithm of missing light, from which the ground is invented
 SEEN = 1 / 512  # of encoded light: less is no shadow
 BLACK = 0.02  # of linear light, below which a logarithm says little
 REACH = 2.0  # cells of what is missing, over which it is sharpened
-FROM_ABOVE = 90.0  # degrees: the shadow is the outline itself
 HARD = 0.9  # natural logarithm of missing light, from which an edge is looked for in the photo
 WIDE = 3.0  # cells, over which the light on either side of an edge is measured
 SIDES = (0.15, 0.85)  # of what is missing there, that is lit ground, or all in shadow
@@ -261,6 +300,25 @@ def without_shadow(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Ma
     return lit, is_changed
 
 
+class _Seen(NamedTuple):
+    """What a box of the photo shows of a shadow."""
+
+    free: Mask  # (h, w) where the ground is seen
+    colours: F32  # (h, w, 3) natural logarithm of linear light
+    light: F32  # (h, w) the mean of them
+    missing: F32  # (h, w) natural logarithm of the light that is missing
+    is_told: Mask  # (h, w) where the photo's own step says so
+
+
+def _seen(pixels: Pixels, old: OldShadow, box: Box) -> _Seen:
+    part = pixels[box[1] : box[3], box[0] : box[2]]
+    free = sampled(old.free, (old.left, old.top), old.pitch, box) > MOSTLY
+    colours = np.log(unit_pixels(part) ** np.float32(GAMMA) + np.float32(BLACK))
+    light = np.asarray(cv2.transform(colours, THIRDS), np.float32)
+    sharp = _sharpened(old.missing(box), light, old)
+    return _Seen(free, colours, light, *_hard_edged(sharp, light, old, free))
+
+
 def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mask]:
     """As `without_shadow`, and where it is so dark that the photo shows little of the ground.
 
@@ -269,12 +327,8 @@ def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mas
     height, width = pixels.shape[:2]
     around = _grown(old.bounds(width, height), LOOKS * old.pitch, width, height)
     part = pixels[around[1] : around[3], around[0] : around[2]]
-    free = sampled(old.free, (old.left, old.top), old.pitch, around) > MOSTLY
-    colours = np.log(unit_pixels(part) ** np.float32(GAMMA) + np.float32(BLACK))
-    # Natural logarithm of linear light.
-    light = np.asarray(cv2.transform(colours, THIRDS), np.float32)
+    free, colours, light, missing, is_told = _seen(pixels, old, around)
     found = old.missing(around)
-    missing, is_told = _hard_edged(_sharpened(found, light, old), light, old, free)
     usual = usual_light(light, missing, free, old.pitch)
     within = bounded(missing, light, usual, old.pitch)
     missing = np.asarray(np.where(is_told, missing, within), np.float32)
@@ -283,9 +337,12 @@ def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mas
         too_dark(missing, light, usual, old.pitch),
     )
     is_lost = np.where(is_told, False, dim | black)
+    if is_told.any():
+        is_lost |= is_told & free & _is_edge(missing, old.pitch)
     tint = tinted(colours, missing, free & ~is_lost, old.pitch)
     lit = unit_pixels(part) * np.exp(missing[..., None] * (tint / np.float32(GAMMA)))
     lit = evened(lit, missing, free & ~is_lost, old.pitch)
+    lit = calmed(lit, missing, free)
     change = cv2.absdiff(lit, unit_pixels(part))
     is_changed = np.maximum(np.maximum(change[..., 0], change[..., 1]), change[..., 2]) > SEEN / 2
     result = np.where(is_changed[..., None], pixels_from_unit(lit, pixels.dtype), part)
@@ -345,6 +402,38 @@ def _hard_edged(missing: F32, light: F32, old: OldShadow, is_free: Mask) -> tupl
     dark = np.maximum(np.exp(levels[1]) - BLACK, BLACK / 2)
     lacking = np.log(np.maximum(np.exp(levels[0]) - BLACK, dark) / dark)
     return np.where(is_told, into * lacking, missing).astype(np.float32), is_told
+
+
+def _is_edge(missing: F32, pitch: float) -> Mask:
+    """(h, w) where a hard edge runs: its px are neither lit nor in shade, and sharpened."""
+    return np.asarray(_from_hard_edge(missing) < EDGE_PX + EDGE_CELLS * pitch, np.bool_)
+
+
+def _from_hard_edge(missing: F32) -> F32:
+    """(h, w) px from the edge, on either side. Specks of the ground have none."""
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (SPECK, SPECK))
+    is_shade = (missing > HALF * float(missing.max())).astype(np.uint8)
+    is_shade = cv2.morphologyEx(is_shade, cv2.MORPH_CLOSE, kernel)
+    is_shade = cv2.morphologyEx(is_shade, cv2.MORPH_OPEN, kernel)
+    inside, outside = (
+        cv2.distanceTransform(part, cv2.DIST_L2, 5) for part in (is_shade, 1 - is_shade)
+    )
+    return np.asarray(np.maximum(inside, outside), np.float32)
+
+
+def edge_blur(pixels: Pixels, old: OldShadow) -> float | None:
+    """Return the blur of a hard edge, px: the standard deviation of a bell; None where none is."""
+    height, width = pixels.shape[:2]
+    seen = _seen(pixels, old, old.bounds(width, height))
+    if not seen.is_told.any():
+        return None
+    away = _from_hard_edge(seen.missing)
+    near = (away < WIDE * old.pitch) & seen.is_told & seen.free
+    share = seen.missing / float(np.median(seen.missing[seen.missing > HARD]))
+    on_edge = near & (away < EDGE_WIDTH)
+    between = near & (share > SIDES[0]) & (share < SIDES[1])
+    # Of a bell's edge, what is between the two lies within 2.07 deviations.
+    return float(between.sum() / max(int(on_edge.sum()) / 2, 1) / 2.07)
 
 
 def traceless_plate(

@@ -42,6 +42,12 @@ LAST_BLURS = (0.008, 0.035)  # x height, of all of it, at softness 0 and 1
 BAND = 0.07  # x height, of what touches the ground
 BAND_BLUR = 0.03  # x height
 BAND_DROP = 0.015  # x height that the contact lies below the object
+FROM_ABOVE = 90.0  # degrees, at which a ground is seen: the shadow is the outline itself
+FLAT_HEIGHT = 6.0  # x that height, the shorter side of what is seen from above
+CRISP, CELLS = (
+    4,
+    1.5,
+)  # x as fine is a sharp outline; cells of what it is found on, that are looked at
 FARTHEST = 2.0  # x the photo's diagonal, of an object whose shadow is cast
 DARKEST = 0.97  # of the light, at strength 1
 FAINTEST = 1 / 255  # what is weaker is none: the footprint ends somewhere
@@ -121,6 +127,8 @@ class StandingObject:
         sine = float(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9))
         self._above = np.maximum(above - _level(points, above, float(np.clip(sine, 0, 1))), 0.0)
         self._feet = points + self._above[:, None] * normal
+        sides = np.ptp(np.percentile(points[:, :2], (SPRAY, 100 - SPRAY), 0), 0)
+        self._flat = max(float(sides.min()), 1e-9) / FLAT_HEIGHT
         self._is_low = self._above <= BAND * self.height
         self._right = np.array([1.0, 0.0, 0.0])
         self._nearer = np.cross(normal, self._right)  # on the ground, towards the viewer
@@ -144,6 +152,7 @@ class StandingObject:
         (left, top), (right, bottom) = box
         evenly = float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(points)))
         pitch = max((right - left) / cells, (bottom - top) / cells, evenly, 1.0)
+        pitch = max(pitch / CRISP, 1.0) if shadow.ground == FROM_ABOVE else pitch
         blur = max(BLURS[-1] * shadow.softness, LAST_BLURS[1], BAND_BLUR)
         room = 3 * blur * self._size + 4 * pitch
         width, height = (int(np.ceil((a + 2 * room) / pitch)) for a in (right - left, bottom - top))
@@ -155,10 +164,16 @@ class StandingObject:
         At a `level` above the ground, world units: there what is higher throws the same shadow,
         nearer. It is where its light would have met the ground.
         """
-        is_higher = self._above >= level
-        high = (self._above[is_higher] - level) / self.height
+        above = self._heights(shadow)
+        is_higher = above >= level
+        high = (above[is_higher] - level) / self.height
+        size = self._size / grid.pitch
+        if shadow.ground == FROM_ABOVE:  # all of it is as far from the ground
+            cover = _outline(self._fallen(shadow)[is_higher], grid, self.camera)
+            blur = last_blur(shadow) - LAST_BLURS[0]  # of a hard one, a photo shows less
+            return self._smooth(cover, blur * FLAT_HEIGHT * self._flat / self.height * size)
         cover, share = _spread(self._fallen(shadow)[is_higher], high, grid, self.camera)
-        share, size = np.clip(share, 0, 1), self._size / grid.pitch
+        share = np.clip(share, 0, 1)
         mixed = np.zeros_like(cover)
         for k, blur in enumerate(BLURS):
             weight = np.clip(1 - np.abs(share * (len(BLURS) - 1) - k), 0, 1) * (1 - FADE * share)
@@ -199,7 +214,17 @@ class StandingObject:
     def _fallen(self, shadow: Shadow) -> F64:
         """(N, 3) where the shadow of each point is, on the ground."""
         way = self._way(shadow)
-        return np.asarray(self._feet + self._above[:, None] * way, np.float64)
+        return np.asarray(self._feet + self._heights(shadow)[:, None] * way, np.float64)
+
+    def _heights(self, shadow: Shadow) -> F64:
+        """(N,) world units from the ground to each point.
+
+        Of a thing that one looks down on, a bowl or a plate, the rim throws the shadow: the
+        outline, beside itself. How high it is does not show, and is said by how large it is.
+        """
+        if shadow.ground == FROM_ABOVE:
+            return np.full(len(self._above), self._flat)
+        return self._above
 
     def _smooth(self, values: F32, sigma: float) -> F32:
         """Blurred alike in all directions on the ground."""
@@ -231,6 +256,12 @@ def last_blur(shadow: Shadow) -> float:
     return hard + (soft - hard) * shadow.softness
 
 
+def softness_of(blur: float) -> float:
+    """Return the softness of an outline's shadow, blurred by so much x its shorter side."""
+    hard, soft = LAST_BLURS
+    return float(np.clip(blur / (soft - hard), 0, 1))
+
+
 def smooth(values: F32, across: float, down: float | None = None) -> F32:
     """Three boxes one after the other: nearly a bell, and as quick for any width.
 
@@ -257,6 +288,23 @@ def _spread(points: F64, values: F64, grid: SilhouetteGrid, camera: Camera) -> t
     usual = float(np.median(count[count > 0])) if len(index) else 1.0
     cover = np.clip(2 * count / usual, 0, 1)
     return np.asarray(cover, np.float32), np.asarray(total / np.maximum(count, 1e-6), np.float32)
+
+
+def _outline(points: F64, grid: SilhouetteGrid, camera: Camera) -> F32:
+    """(h, w) in [0, 1] what world points (N, 3), spread evenly, cover of a grid; its edge is sharp.
+
+    Where half as many are as amid them, there the edge is, between cells that hold a few.
+    """
+    height, width = (-(-side // CRISP) for side in (grid.height, grid.width))
+    coarse = SilhouetteGrid(grid.left, grid.top, CRISP * grid.pitch, width, height)
+    index, _ = coarse.cells(points, camera)
+    count = np.bincount(index, minlength=width * height).reshape(height, width)
+    near = cv2.GaussianBlur(count.astype(np.float32), (0, 0), CELLS)
+    usual = float(np.median(near[count > 0])) if len(index) else 1.0
+    fine = cv2.resize(near, (CRISP * width, CRISP * height), interpolation=cv2.INTER_CUBIC)
+    steep = np.sqrt(2 * np.pi) * CELLS * CRISP  # from 0 to 1 over a cell of the grid
+    cover = np.clip((fine[: grid.height, : grid.width] / usual - 0.5) * steep + 0.5, 0, 1)
+    return np.asarray(cover, np.float32)
 
 
 def opacity(shadow: Shadow, far: F32, near: F32 | float) -> F32:

@@ -27,8 +27,8 @@ from ...base.arrays import F32, F64, Mask, Pixels
 from ...base.pixels import unit_pixels
 from ...document.model import Matte
 from ...document.settings import MOST_SHADOW, Shadow
-from .old_shadow import BLACK, FROM_ABOVE, OldShadow
-from .shadow import DARKEST, GAMMA
+from .old_shadow import BLACK, OldShadow, edge_blur
+from .shadow import DARKEST, FLAT_HEIGHT, FROM_ABOVE, GAMMA, softness_of
 from .shadow_look import CELLS, SeenShadow, look_for_shadow
 from .shadow_shear import Flat, ShadowSheet, lie, stand
 
@@ -241,7 +241,6 @@ LENGTHS = (0.35, 0.8, 1.6)  # x the object's height
 STEEP = 75.0  # degrees: from there on a thing hides its own foot
 FLAT_LENGTHS = (0.1, 0.25, 0.5)  # x the shorter side of what is seen from above
 # What lies is lifted to a body whose rim stands about so much of that side above the ground.
-FLAT_HEIGHT = 6.0  # x that side's share, of a shadow's length in the rim's heights
 LEAST_FLAT = 0.4  # of the loss without a shadow, that such a one must explain
 SOFTNESS = 0.35
 FINER = ((10.0, 1.3), (5.0, 1.15))  # degrees, and factor of the length
@@ -302,7 +301,11 @@ def find_old_shadow(
     elif seen_from is None:
         shadow = replace(shadow, ground=SHEET_GROUND)
     free = seen.free.astype(np.float32)
-    return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale, free)
+    old = OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale, free)
+    if (blur := edge_blur(pixels, old)) is None:
+        return old
+    softness = softness_of(blur / (seen.standing.height * seen.pitch))
+    return replace(old, shadow=replace(shadow, softness=softness))
 
 
 def _told(
