@@ -12,7 +12,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, Mask, Pixels, Selection
+from ..base.arrays import F32, U8, Mask, Pixels, Selection
 from ..base.progress import silent
 from ..compose.plate.completion import complete, shrunk, smooth
 from ..compose.plate.patch_detail import with_detail
@@ -25,6 +25,7 @@ SEARCH = 20_000  # px of the small picture in which patches are looked for
 AROUND = 4.0  # x the strip's depth, of the object from which it is filled
 LEAST = 40  # px of a strip, or of what it is filled from
 SURE = 0.95  # alpha of the matte, from which its colours are the object's own
+HALF = 0.5  # of a small px, that must be known
 FAINT = 0.02  # alpha below which nothing is seen
 RIM = 2  # small px of the object's edge that are no source, for what is beyond is in their patches
 COARSE = 2.0  # small px, standard deviation
@@ -41,44 +42,50 @@ def cut_out_beyond(pixels: Pixels, mask: Selection, mixed: Mask | None = None) -
 
 def with_beyond(matte: Matte, size: tuple[int, int], seed: int = 0) -> Matte:
     """Return `matte` with colours made for what of it is beyond a photo of `size` (w, h) px."""
-    beyond = np.ones(matte.alpha.shape, bool)
     x0, y0, x1, y1 = matte.box
-    inner = slice(max(-y0, 0), size[1] - y0), slice(max(-x0, 0), size[0] - x0)
-    beyond[inner] = False
-    shown = matte.alpha > FAINT
-    hole = beyond & shown
-    if hole.sum() < LEAST or (shown & ~beyond).sum() < LEAST:
-        return matte
     depth = float(max(-x0, -y0, x1 - size[0], y1 - size[1]))
-    away = cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5)
+    if depth <= 0:
+        return matte
+    beyond = np.ones(matte.alpha.shape, bool)
+    beyond[max(-y0, 0) : size[1] - y0, max(-x0, 0) : size[0] - x0] = False
+    shown = matte.alpha > FAINT
+    if (beyond & shown).sum() < LEAST or (shown & ~beyond).sum() < LEAST:
+        return matte
+    away = cv2.distanceTransform((~(beyond & shown)).astype(np.uint8), cv2.DIST_L2, 5)
     near = (away < AROUND * depth) & shown
     rows, columns = np.flatnonzero(near.any(1)), np.flatnonzero(near.any(0))
     window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    own = matte.foreground[window]
-    made = _filled(own, matte.alpha[window], beyond[window], depth, seed)
+    made = _filled(matte.foreground[window], matte.alpha[window], beyond[window], depth, seed)
     if made is None:
         return matte
-    foreground = matte.foreground.copy()
-    foreground[window] = np.where(beyond[window][..., None], made, own)
+    foreground, there = matte.foreground.copy(), beyond[window]
+    foreground[window][there] = np.float32(1 / 255) * made[there]
     return replace(matte, foreground=foreground)
 
 
-def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float, seed: int) -> F32 | None:
+def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float, seed: int) -> U8 | None:
     """(h, w, 3) `foreground` with what is `beyond` the frame (h, w) filled, or None.
 
     `depth` is how far the object goes on there, px.
     """
-    shown, known = alpha > FAINT, (alpha > SURE) & ~beyond
-    colors = np.where(shown[..., None], foreground, fill_in(foreground, shown))
-    levels = np.asarray(255 * colors, np.float32)
     height, width = beyond.shape
     scale = min(1.0, (SEARCH / beyond.size) ** 0.5)
     size = max(8, round(width * scale)), max(8, round(height * scale))
-    small, share = shrunk(levels, (~beyond).astype(np.float32), size)
-    hole = share < 0.5
-    solid = cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    crop = np.clip(255 * foreground + 0.5, 0, 255).astype(np.uint8)
+    # The object's own colours, and what is around it as it ends there.
+    own, share = shrunk(crop, ((alpha > FAINT) & ~beyond).astype(np.float32), size)
+    small = fill_in(own, share > HALF)
+    values, share = shrunk(crop, (alpha > FAINT).astype(np.float32), size)
+    mirrored = fill_in(values, share > HALF)
+    known, solid = (
+        np.asarray(
+            cv2.resize(part.astype(np.float32), size, interpolation=cv2.INTER_AREA), np.float32
+        )
+        for part in (~beyond, (alpha > SURE) & ~beyond)
+    )
+    hole = known < HALF
     kernel = np.ones((2 * RIM + 1,) * 2, np.uint8)  # the frame is no edge of the object
-    inner = cv2.erode(((solid > 0.5) | hole).astype(np.uint8), kernel, borderValue=1) > 0
+    inner = cv2.erode(((solid > HALF) | hole).astype(np.uint8), kernel, borderValue=1) > 0
     if (inner & ~hole).sum() < LEAST:
         return None
     away = cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5)
@@ -86,12 +93,9 @@ def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float, seed: int) 
     unlikely = np.where(inner, far, STRANGE).astype(np.float32)
     # What the strip's coarse colours may be: the mirror image's, which agree with what is beside
     # them, and those that go on smoothly.
-    mirrored = cv2.resize(levels, size, interpolation=cv2.INTER_AREA)
     guess = 0.5 * (mirrored + smooth(small, (~hole).astype(np.float32)))
     coarse = np.asarray(cv2.GaussianBlur(guess, (0, 0), COARSE), np.float32)
     tone = PatchTone(coarse, np.ones(hole.shape, np.float32))
-    completion = complete(small, share, Guide(unlikely, tone=tone), seed, silent)
-    crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
+    completion = complete(small, known, Guide(unlikely, tone=tone), seed, silent)
     colors = np.clip(completion.colors, 0, 255).astype(np.float32)
-    filled = with_detail(crop, beyond, colors, completion.sources)
-    return np.asarray(filled, np.float32) * np.float32(1 / 255)
+    return np.asarray(with_detail(crop, beyond, colors, completion.sources), np.uint8)

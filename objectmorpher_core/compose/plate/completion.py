@@ -16,7 +16,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, I32, Mask, frozen
+from ...base.arrays import F32, I32, U8, Mask, frozen
 from ...base.progress import Progress
 from ...base.threads import in_threads
 from . import patch_search
@@ -76,7 +76,7 @@ class _Level:
         return self.known.shape[1], self.known.shape[0]
 
 
-def shrunk(values: F32, known: F32, size: tuple[int, int]) -> tuple[F32, F32]:
+def shrunk(values: F32 | U8, known: F32, size: tuple[int, int]) -> tuple[F32, F32]:
     """Values (h, w, C) and how much is known of them (h, w), both at another size (w, h) px."""
     share = np.asarray(cv2.resize(known, size, interpolation=cv2.INTER_AREA), np.float32)
     weighted = [
