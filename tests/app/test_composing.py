@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from objectmorpher.canvas.layer import FrameObject
 from objectmorpher.canvas.layers import FRAME
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.composing import SHADOW
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.brush_tools import ComposeTool
 from objectmorpher_core.compose.plate.plate import plate_cover, plate_picture
@@ -246,6 +249,43 @@ def test_the_shadow_in_the_photo_is_taken_along(editor: Editor) -> None:
     assert brighter > 20
     editor.undo()  # shadow and background at once
     assert editor.document is document
+
+
+@pytest.mark.slow
+def test_a_shadow_that_would_stay_behind_is_offered_once_what_threw_it_is_moved(
+    editor: Editor,
+) -> None:
+    document = standing(thrown(35.0, 0.8))
+    moved = document.objects[0].placement
+    editor.start(edits.set_placement(document, 0, Placement()))
+    editor.view.tool = ToolName.PLACE
+    editor.apply("Move", edits.set_placement(editor.document, 0, moved))
+    wait_until(editor, lambda: editor.composing.offer is not None)
+    assert editor.view.tool is ToolName.PLACE, "the artist is at work"
+    assert editor.message is not None and editor.message.action is not None
+    farther = replace(moved, move=(-80.0, 5.0))
+    editor.apply("Move", edits.set_placement(editor.document, 0, farther))
+    assert editor.composing.offer is not None, "the object is only moved on"
+    before, action = editor.document, editor.message.action
+    editor.message = None  # as the status bar does
+    action.run()
+    assert editor.object is not None and editor.object.shadow.strength > 0.4
+    assert editor.object.placement == farther and editor.composing.offer is None
+    editor.undo()
+    assert editor.document is before
+    wait_for_jobs(editor)
+    assert editor.composing.offer is None, "it is asked once"
+
+
+@pytest.mark.slow
+def test_nothing_is_said_where_no_shadow_stays_behind(editor: Editor) -> None:
+    document = standing(None)
+    moved = document.objects[0].placement
+    editor.start(edits.set_placement(document, 0, Placement()))
+    editor.apply("Move", edits.set_placement(editor.document, 0, moved))
+    wait_until(editor, lambda: editor.jobs.is_busy(SHADOW))
+    wait_for_jobs(editor)
+    assert editor.message is None and editor.composing.offer is None
 
 
 @pytest.mark.slow

@@ -108,7 +108,7 @@ class Editor(EditorState):
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
             self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
-            self.leaving_out.poll,
+            self.leaving_out.poll, self.composing.watch,
         )  # fmt: skip
 
     def _ask_elsewhere(self) -> None:

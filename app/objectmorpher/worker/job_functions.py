@@ -350,6 +350,7 @@ class Cutout:
     matte: Matte
     covered: Mask
     ground: float | None  # degrees above it from which one looks, where that is known
+    is_asked: bool = True  # by the artist: less may speak for a shadow than where nobody asked
 
 
 def take_shadow(
@@ -361,10 +362,11 @@ def take_shadow(
     """
     from objectmorpher_core import compose
     from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
-    from objectmorpher_core.compose.shadow.shadow_fit import LIKELY, find_old_shadow
+    from objectmorpher_core.compose.shadow.shadow_fit import LIKELY, SURE, find_old_shadow
 
     progress(0.0, "")
-    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, LIKELY)
+    margin = LIKELY if cutout.is_asked else SURE
+    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, margin)
     if old is None:
         return None
     inpainter = compose.load(choice.backend, bool(choice.hints))

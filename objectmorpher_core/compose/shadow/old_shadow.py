@@ -13,7 +13,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, Mask, Pixels
+from ...base.arrays import F32, U8, Mask, Pixels
 from ...base.pixels import crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, silent
 from ...document.model import Plate
@@ -398,6 +398,7 @@ def _hard_edged(missing: F32, light: F32, old: OldShadow, is_free: Mask) -> tupl
     into = (levels[0] - fine) / np.maximum(step, HARD)
     into = np.clip((into - SURE_EDGE[0]) / (SURE_EDGE[1] - SURE_EDGE[0]), 0, 1)
     is_told = (step > HARD) & (missing > 0)
+    into *= _is_joined(into, missing > SIDES[1] * deep, old.pitch)  # not a dark thing beside it
     # Told of light + BLACK: of the light alone, as it is given back, more is missing.
     dark = np.maximum(np.exp(levels[1]) - BLACK, BLACK / 2)
     lacking = np.log(np.maximum(np.exp(levels[0]) - BLACK, dark) / dark)
@@ -411,10 +412,7 @@ def _is_edge(missing: F32, pitch: float) -> Mask:
 
 def _from_hard_edge(missing: F32) -> F32:
     """(h, w) px from the edge, on either side. Specks of the ground have none."""
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (SPECK, SPECK))
-    is_shade = (missing > HALF * float(missing.max())).astype(np.uint8)
-    is_shade = cv2.morphologyEx(is_shade, cv2.MORPH_CLOSE, kernel)
-    is_shade = cv2.morphologyEx(is_shade, cv2.MORPH_OPEN, kernel)
+    is_shade = _without_specks(missing > HALF * float(missing.max()))
     inside, outside = (
         cv2.distanceTransform(part, cv2.DIST_L2, 5) for part in (is_shade, 1 - is_shade)
     )
@@ -434,6 +432,21 @@ def edge_blur(pixels: Pixels, old: OldShadow) -> float | None:
     between = near & (share > SIDES[0]) & (share < SIDES[1])
     # Of a bell's edge, what is between the two lies within 2.07 deviations.
     return float(between.sum() / max(int(on_edge.sum()) / 2, 1) / 2.07)
+
+
+def _is_joined(into: F32, core: Mask, pitch: float) -> Mask:
+    """(h, w) the shade, where one is half `into` it, that holds the `core`; with its edge."""
+    is_shade = _without_specks(into > HALF)
+    _, labels = cv2.connectedComponents(is_shade)
+    found = np.unique(labels[core & (is_shade > 0)])
+    away = cv2.distanceTransform((~np.isin(labels, found)).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.asarray(away < EDGE_PX + EDGE_CELLS * pitch, np.bool_)
+
+
+def _without_specks(mask: Mask) -> U8:
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (SPECK, SPECK))
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+    return np.asarray(cv2.morphologyEx(closed, cv2.MORPH_OPEN, kernel), np.uint8)
 
 
 def traceless_plate(

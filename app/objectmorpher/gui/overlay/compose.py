@@ -20,9 +20,7 @@ SOURCE = 6.0  # points, radius of the mark from where is cloned
 def draw_compose(canvas: CanvasPainter) -> None:
     """Draw the Compose tool's brush and note over the photo."""
     editor = canvas.editor
-    if (offer := editor.composing.offer) is not None:
-        for outline in editor.derived.contours(offer.outlined):
-            canvas.dashes(canvas.at(outline))
+    draw_offered_shadow(canvas)
     if editor.view.compose.is_painting:
         if editor.pointer is not None and editor.is_on_photo(editor.pointer.xy):
             canvas.brush(editor.pointer.alt)
@@ -44,6 +42,14 @@ def draw_compose(canvas: CanvasPainter) -> None:
             _draw_hint(canvas, hint, 0.75)
         if editor.hinting.dragged is not None:
             _draw_hint(canvas, editor.hinting.dragged, 1.0)
+
+
+def draw_offered_shadow(canvas: CanvasPainter) -> None:
+    """Outline what would be taken along of a shadow in the photo."""
+    editor = canvas.editor
+    if (offer := editor.composing.offer) is not None:
+        for outline in editor.derived.contours(offer.outlined):
+            canvas.dashes(canvas.at(outline))
 
 
 def _draw_owner(canvas: CanvasPainter) -> None:
