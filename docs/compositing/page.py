@@ -144,8 +144,11 @@ ground, and the side from which the thing itself is lit; and how far the network
 fitted one agree, as evidence. None of them finds more where equally many are imagined.
 
 On photographs: the saucer's shadow, the motorcycle's, and a bowl's in the sun, seen from above. Its
-shadow is its outline, beside itself; where its hard edge is, and how dark it is, the photo shows px
-for px.
+shadow is its outline, beside itself, in the photo and where it goes; where its hard edge is, how
+hard and how dark, the photo shows px for px. The edge itself, a few px that are neither lit nor
+shaded and that the camera has sharpened, is filled in as a hole is: a line of 10 levels was left
+there, now 2. What a JPEG file shows of a ground in deep shade is blotched and grainy, and calmed to
+what lit ground shows.
 
 ![Photos with the shadow, without it, and with the thing moved and its new shadow](photos.jpg)
 

@@ -8,7 +8,9 @@ from plates import SAMPLES
 from skimage import data
 
 from objectmorpher_core.base.arrays import Pixels
-from objectmorpher_core.compose.shadow.old_shadow import without_shadow
+from objectmorpher_core.compose import load
+from objectmorpher_core.compose.plate.plate import plate_crop
+from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
 from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import open_photo, run_script, select
@@ -56,7 +58,10 @@ def shadow_pictures() -> list[list[Pixels]]:
         assert mask is not None
         old = find_old_shadow(photo, build_matte(photo, mask, MARGIN))
         height, width = mask.shape
-        lit = photo if old is None else without_shadow(photo, old, (0, 0, width, height))[0]
+        lit = photo
+        if old is not None:
+            plate = traceless_plate(photo, mask, [old], load("patchmatch"))
+            lit = plate_crop(photo, plate, (0, 0, width, height))
         moved = run_script(encoded, name, script).composite.pixels
         rows.append([photo, np.where(mask[..., None], photo, lit), moved])
     return rows

@@ -33,8 +33,9 @@ KEPT = 0.7  # of the object's length, where its photo is cut
 LEAST = 12  # px of the strip, and the root of what is compared
 TILE = 14 * 16  # px of what DINOv2 and HED-VGG compare
 OUTLINED = {
-    "astronaut": ("face", "flag", "helmet", "shuttle", "patch", "valve"), "flower": ("second_flower",),
-    "china": ("pagoda",), "motorcycle": ("motorcycle", "headlight", "seat"),
+    "astronaut": ("face", "flag", "helmet", "shuttle", "patch", "valve"),
+    "flower": ("second_flower",), "china": ("pagoda",),
+    "motorcycle": ("motorcycle", "headlight", "seat"),
     "camera": ("cameraman", "tower"), "coins": ("coin", "dim_coin"),
 }  # fmt: skip
 
