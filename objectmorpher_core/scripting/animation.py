@@ -342,7 +342,8 @@ class _Film:
         old = gimbal.of(item.placement.turn)
         turn = gimbal.turn((old[0] + yaw, old[1], old[2]))
         placement = replace(item.placement, turn=turn)
-        return self._document.with_object(k, replace(item, placement=placement, is_visible=True))
+        turned = replace(item, placement=placement, is_visible=True)
+        return replace(self._document.with_object(k, turned), refined=None)
 
     def _gimbal(self, item: EditObject) -> Gimbal:
         return gimbal_of(item, self._document)

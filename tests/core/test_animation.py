@@ -324,6 +324,8 @@ def test_a_refinement_is_seen_only_while_the_edit_is_still():
     assert np.array_equal(found[23], composite(document).pixels)
     darker = [difference(found[k], expected[k]) for k in (20, 21, 23)]
     assert darker[0] < darker[1] <= darker[2]
+    first = [next(frames(d, Clip("sway", seconds=1.0, rate=20))) for d in (document, plain)]
+    assert np.array_equal(*first)
 
 
 @pytest.mark.parametrize("times", [2, 3])
