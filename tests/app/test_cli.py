@@ -352,6 +352,10 @@ def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
     assert a["handles"] == b["handles"]
     assert a["pixels"] == b["pixels"]
     capsys.readouterr()
+    one_name = ["--save-handles", "h.json", "--report", "../" + folder.name + "/h.json"]
+    assert cli.main(["replay", "s.omorph", "-o", "third.png", *one_name]) == cli.FAILED
+    assert "two outputs have the same name" in capsys.readouterr().err
+    assert not Path("h.json").exists() and not Path("third.png").exists()
     assert cli.main(["info", "s.omorph", "--json"]) == 0
     info = json.loads(capsys.readouterr().out)
     assert info["photo"] == {"name": "photo.png", "width": 160, "height": 120, "bits": 8}
