@@ -192,7 +192,7 @@ class Clip:
     motion: str = "morph"  # photo, edit and back; the object sways; turns; through key poses
     seconds: float = 4.0
     rate: float = 25.0  # frames a second
-    object: int = 0  # index of the one that sways or turns
+    object: int | None = None  # index of the one that sways or turns; None: the first that can
     longest: int = LONGEST  # px
 
     def __post_init__(self) -> None:
@@ -222,8 +222,8 @@ def frames(document: Document, clip: Clip, progress: Progress = silent) -> Itera
     small = shrunk(document, times)
     if clip.motion == "morph" and not any(item.is_moved for item in small.objects):
         raise ValueError("nothing was moved, there is nothing to be seen")
-    chosen = small.objects[clip.object].lifted if clip.object < len(small.objects) else None
-    if clip.motion in ("sway", "turn") and chosen is None:
+    turning = _turning(small, clip.object)
+    if clip.motion in ("sway", "turn") and turning is None:
         raise ValueError("lift an object first, then it can turn")
     film = _Film(small, keys)
     for k in range(clip.count):
@@ -234,9 +234,17 @@ def frames(document: Document, clip: Clip, progress: Progress = silent) -> Itera
         elif clip.motion == "keys":
             pixels = film.drawn(film.keyed(time))
         else:
-            pixels = film.drawn(film.turned(clip.object, _yaw_at(time, clip.motion)))
+            pixels = film.drawn(film.turned(turning or 0, _yaw_at(time, clip.motion)))
         height, width = (side - side % 2 for side in pixels.shape[:2])
         yield np.ascontiguousarray(pixels[:height, :width])
+
+
+def _turning(document: Document, wanted: int | None) -> int | None:
+    """The index of the lifted object that is wanted, or else of the first that is seen."""
+    lifted = [k for k, item in enumerate(document.objects) if item.lifted is not None]
+    if wanted is not None:
+        return wanted if wanted in lifted else None
+    return next((k for k in lifted if document.objects[k].is_visible), next(iter(lifted), None))
 
 
 def station_at(time: float, count: int) -> tuple[int, float]:

@@ -87,6 +87,20 @@ def test_an_object_turns_without_a_jump(motion, up):
     assert 0 < max(gaps) < 6 * np.median(gaps) + 1
 
 
+@pytest.mark.parametrize("first", ["gone", "never lifted"])
+def test_the_first_object_that_is_seen_and_lifted_turns(first):
+    document = shapes.scene("ellipse").document()
+    thing = document.objects[0]
+    gone = replace(thing, is_visible=False, placement=Placement(move=(9.0, 0.0)))
+    before = gone if first == "gone" else replace(thing, lifted=None, matte=None)
+    document = replace(document, objects=(before, thing))
+    found = list(frames(document, Clip("turn", seconds=1.0, rate=8)))
+    assert np.array_equal(found[0], composite(document).pixels)
+    assert difference(found[2], found[0]) > 1.0
+    named = list(frames(document, Clip("turn", seconds=1.0, rate=8, object=1)))
+    assert all(np.array_equal(a, b) for a, b in zip(found, named, strict=True))
+
+
 def test_between_photo_and_edit_a_thing_that_is_spun_stands():
     """Half of a spin about its own upright is a spin by half the angle."""
     scene = shapes.scene("ellipse")
