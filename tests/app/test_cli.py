@@ -105,6 +105,19 @@ def test_key_poses_of_the_command_line_are_those_of_a_script(folder):
     assert cli.main(["replay", "e.omorph", "-o", "x.png", *video, "none/frames"]) == 1
 
 
+def test_a_folder_of_frames_holds_one_film(folder, capsys):
+    """What is left of a longer one would seem to go on."""
+    video = ["--turn", "20", "--save-video", "frames", "--seconds"]
+    assert _edit(*video, "0.4") == 0
+    Path("out.png").unlink()
+    before = {path: path.read_bytes() for path in Path("frames").iterdir()}
+    assert _edit(*video, "0.2") == cli.FAILED
+    assert "photo-0005.png is of a longer video" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in Path("frames").iterdir()} == before
+    assert not Path("out.png").exists()
+    assert _edit(*video, "0.4") == 0
+
+
 def test_nothing_to_do_gives_the_photo_back(folder):
     assert _edit() == 0
     assert np.array_equal(_pixels("out.png"), PIXELS)
