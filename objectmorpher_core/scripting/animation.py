@@ -299,16 +299,17 @@ class _Film:
     def morph(self, time: float) -> RGB:
         """The picture at a `time` in [0, 1) of the way from the photo to the edit and back.
 
-        Objects move; what else the edit changes of their look is faded in.
+        Objects move; what else the edit changes is faded in: their look, shadows old and new, and
+        what was repaired by hand.
         """
         share = share_at(time)
         if share >= 1:
             return self.drawn(self._refined(refined_at(time)))
         moved = self._morphed(share)
         objects = tuple(map(_as_in_the_photo, moved.objects))
-        plain = replace(moved, objects=objects)
+        plain = replace(moved, objects=objects, plate=_with_old_shadows(moved))
         is_alike = all(a is b for a, b in zip(objects, moved.objects, strict=True))
-        if is_alike or share <= 0:
+        if (is_alike and plain.plate is moved.plate) or share <= 0:
             return self.drawn(plain)
         before, after = (self.drawn(document).astype(np.float32) for document in (plain, moved))
         return np.rint(before + share * (after - before)).astype(np.uint8)
@@ -401,12 +402,29 @@ def _as_in_the_photo(item: EditObject) -> EditObject:
     """The object where it is, looking as in the photo; one of another photo is not there."""
     if item.is_visitor:
         return replace(item, lifted=None, is_visible=False)
-    if item.lifted is None or (
-        item.is_visible and item.finish == AS_IN_THE_PHOTO and not item.is_painted
-    ):
+    is_changed = item.finish != AS_IN_THE_PHOTO or item.is_painted or item.shadow.strength > 0
+    if item.lifted is None or (item.is_visible and not is_changed):
         return item
     matte = None if item.matte is None else replace(item.matte, paint=None)
-    return replace(item, matte=matte, is_visible=True, finish=AS_IN_THE_PHOTO)
+    return replace(
+        item, matte=matte, is_visible=True, finish=AS_IN_THE_PHOTO,
+        shadow=replace(item.shadow, strength=0.0),
+    )  # fmt: skip
+
+
+def _with_old_shadows(document: Document) -> Plate | None:
+    """The plate where objects hide it; elsewhere the photo, with what was repaired there."""
+    plate = document.plate
+    if plate is None or plate.painted is None:
+        return plate
+    is_bare = plate.painted.copy()
+    for item in document.objects:
+        if (matte := item.matte_here) is not None:
+            is_bare &= crop(matte.alpha, matte.box, plate.box) <= 0
+    x0, y0, x1, y1 = plate.box
+    own = document.photo.pixels[y0:y1, x0:x1]
+    pixels = np.where(is_bare[..., None], own, plate.pixels)
+    return replace(plate, pixels=pixels, hole=plate.hole & ~is_bare, painted=None)
 
 
 def _alike(start: Sequence[Handle], end: Sequence[Handle]) -> bool:

@@ -25,7 +25,7 @@ from objectmorpher_core.document.key_edits import (
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import spun
 from objectmorpher_core.document.pose import Pose
-from objectmorpher_core.document.settings import AS_IN_THE_PHOTO, Refined
+from objectmorpher_core.document.settings import AS_IN_THE_PHOTO, Refined, Shadow
 from objectmorpher_core.document.visitor_edits import departing, with_visitor
 from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
 from objectmorpher_core.pipeline import run_script
@@ -319,6 +319,29 @@ def test_a_morph_begins_as_the_photo_whatever_the_edit_changes(change):
     assert np.array_equal(found[10], edit)
     gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
     assert max(gaps) < 0.6 * difference(photo, edit)
+
+
+def test_shadows_and_repairs_fade_in_with_a_morph():
+    """The ground beside the object, lightened in the plate, does not change in one picture."""
+    document = shapes.scene("ellipse").document()
+    plate = document.plate
+    assert plate is not None
+    ground = np.zeros_like(plate.hole)
+    ground[100:118, 10:150] = True
+    pixels = np.where(ground[..., None], 255, plate.pixels).astype(np.uint8)
+    plate = replace(plate, pixels=pixels, hole=plate.hole | ground, painted=ground)
+    document = edits.set_plate(document, plate)
+    document = edits.set_placement(document, 0, Placement(move=(14.0, -6.0)))
+    document = edits.set_shadow(document, 0, Shadow(strength=0.8))
+    found = [f[102:116, 20:140] for f in frames(document, Clip(seconds=2.0, rate=20))]
+    photo, edit = (
+        document.photo.pixels[102:116, 20:140],
+        composite(document).pixels[102:116, 20:140],
+    )
+    assert np.array_equal(found[0], photo) and np.array_equal(found[20], edit)
+    whole = difference(photo, edit)
+    gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
+    assert whole > 30 and max(gaps) < 0.25 * whole
 
 
 def refined(document: Document) -> Document:
