@@ -178,6 +178,36 @@ def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) ->
     return replace(document, objects=tuple(objects), refined=None)
 
 
+def brought_into_sight(document: Document, k: int, posed: Posed) -> Document:
+    """The document with object `k` in front of others, where they hide most of it.
+
+    What is to stay in front stays there.
+    """
+    objects, camera = document.objects, document.photo.camera
+    seen = [i for i, o in enumerate(objects) if o.lifted is not None and o.is_visible]
+    order = back_to_front(document, {i: posed(i) for i in seen})
+    own = posed(k)
+    before = order[order.index(k) + 1 :]
+    hidden = {i: _behind(own, posed(i), camera) for i in before if not stands_in_front(objects[i])}
+    if not hidden or np.mean(np.any(list(hidden.values()), axis=0)) <= MOSTLY:
+        return document
+    last = max(order.index(i) for i, points in hidden.items() if points.any())
+    order = [*order[: last + 1], k, *order[last + 1 :]]
+    order.remove(k)
+    return reordered(document, k, order, posed)
+
+
+def _behind(own: PosedSplats, other: PosedSplats, camera: Camera) -> Mask:
+    """(N,) which points of an object are seen where another one is."""
+    depth = max(float(np.median(other.means[:, 2])), 1e-9)
+    cell = max(EDGE * other.rest.spacing * other.scale * camera.focal / depth, 1.0)
+    cells = []
+    for splats in (own, other):
+        xy = np.floor(camera.project(splats.means) / cell).clip(-1e6, 1e6).astype(np.int64)
+        cells.append(np.where(splats.means[:, 2] > 0, xy[:, 0] + (xy[:, 1] << 32), -1))
+    return np.isin(*cells)
+
+
 def leaves_a_hole(objects: tuple[EditObject, ...], k: int) -> bool:
     """Whether nothing stands where object `k` was in the photo: no copy of it at rest."""
     item = objects[k]

@@ -11,6 +11,8 @@ import struct
 ORIENTATION = 0x0112
 EXIF_IFD = 0x8769
 FOCAL_LENGTH_35MM = 0xA405
+SIZES = ((0x0100, 0x0101), (0xA002, 0xA003))  # width and height: of the file, and its EXIF's own
+ON_ITS_SIDE = 5  # from this orientation on rows are columns
 THUMBNAIL_OFFSET, THUMBNAIL_LENGTH = 0x0201, 0x0202
 SHORT, LONG = 3, 4
 PREFIX = b"Exif\0\0"  # what JPEG and some WebP files put before the block
@@ -37,7 +39,8 @@ def focal_35mm(block: bytes) -> float | None:
 
 
 def upright(block: bytes) -> bytes:
-    """The block for the upright picture: orientation 1, no thumbnail of the unedited photo.
+    """The block for the upright picture: orientation 1, its width and height, and no thumbnail of
+    the unedited photo.
 
     A block that cannot be read comes back as it is.
     """
@@ -48,6 +51,8 @@ def upright(block: bytes) -> bytes:
         if field is not None and field[0] in (SHORT, LONG):
             number = "H" if field[0] == SHORT else "I"
             struct.pack_into(walker.order + number, patched, field[1], 1)
+        if orientation(block) >= ON_ITS_SIDE:
+            _swap_sizes(walker, patched)
     except (struct.error, ValueError):
         return block
     try:
@@ -62,6 +67,23 @@ def upright(block: bytes) -> bytes:
     except (struct.error, ValueError):
         pass  # it ends with its first directory
     return bytes(patched)
+
+
+def _swap_sizes(walker: _Walker, patched: bytearray) -> None:
+    """Writes width as height and height as width, wherever the block says both."""
+    for ifd in (walker.first, walker.value(EXIF_IFD)):
+        fields = {} if ifd is None else walker.fields(ifd)
+        for tags in SIZES:
+            pair = [fields[tag] for tag in tags if tag in fields]
+            if len(pair) < 2 or not all(kind in (SHORT, LONG) for kind, _ in pair):
+                continue
+            codes = [walker.order + ("H" if kind == SHORT else "I") for kind, _ in pair]
+            values = [
+                struct.unpack_from(code, walker.block, offset)[0]
+                for code, (_, offset) in zip(codes, pair, strict=True)
+            ]
+            for code, (_, offset), value in zip(codes, pair, reversed(values), strict=True):
+                struct.pack_into(code, patched, offset, value)
 
 
 class _Walker:

@@ -28,6 +28,7 @@ from ..document.key_edits import at_key, count_keys
 from ..document.model import Document, EditObject, Handle, Matte, Photo, Placement, Plate, Pose
 from ..document.paint import Paint
 from ..document.placement import gimbal_of
+from ..document.settings import AS_IN_THE_PHOTO, Refined
 from ..pictures.image import to_u8
 
 Box = tuple[int, int, int, int]
@@ -44,17 +45,18 @@ def shrunk(document: Document, times: int) -> Document:
     if times == 1:
         return document
     photo = document.photo
+    camera = _camera(photo.camera, times, width, height)
     pixels = photo.pixels[: height * times, : width * times]
     picture = replace(
         photo.picture, pixels=pixels_from_unit(_means(unit_pixels(pixels), times), pixels.dtype),
         alpha=None,
     )  # fmt: skip
-    camera = _camera(photo.camera, times, width, height)
     return replace(
         document,
         photo=Photo(picture, camera, photo.source, photo.name),
         objects=tuple(_object(item, times, width, height) for item in document.objects),
         plate=None if document.plate is None else _plate(document.plate, times, picture.pixels),
+        refined=None if document.refined is None else _refined(document.refined, times, camera),
         horizon=None if document.horizon is None else document.horizon / times,
     )
 
@@ -84,6 +86,7 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
         item, mask=mask, coverage=None, found=None, lifted=lifted,
         matte=None if matte is None else _matte(matte, times), mixed=None, contaminated=None,
         placement=smaller(placement, times),
+        finish=replace(item.finish, blur=item.finish.blur / times),
     )  # fmt: skip
 
 
@@ -138,6 +141,21 @@ def _plate(plate: Plate, times: int, photo: np.ndarray) -> Plate:
     return Plate(left, top, pixels, share[..., 0] > 0, plate.backend, plate.seed, painted)
 
 
+def _refined(refined: Refined, times: int, camera: Camera) -> Refined | None:
+    """What was refined of the photo that `camera` shows `times` smaller; None: nothing of it."""
+    x0, y0, x1, y1 = _aligned(refined.box, times)
+    box = (x0, y0, min(x1, camera.width * times), min(y1, camera.height * times))
+    if box[0] >= box[2] or box[1] >= box[3]:
+        return None
+    alpha = np.asarray(crop(refined.alpha, refined.box, box), np.float32)
+    colours = unit_pixels(crop(refined.pixels, refined.box, box)) * alpha[..., None]
+    share = _means(alpha, times)
+    mean = _means(np.asarray(colours, np.float32), times) / np.maximum(share, 1e-6)[..., None]
+    pixels = pixels_from_unit(np.minimum(mean, 1), refined.pixels.dtype)
+    levels = np.rint(share).astype(np.uint8)
+    return replace(refined, left=x0 // times, top=y0 // times, pixels=pixels, alpha=levels)
+
+
 def _aligned(box: Box, times: int) -> Box:
     """The smallest box around it whose sides lie between squares."""
     x0, y0, x1, y1 = box
@@ -174,7 +192,7 @@ class Clip:
     motion: str = "morph"  # photo, edit and back; the object sways; turns; through key poses
     seconds: float = 4.0
     rate: float = 25.0  # frames a second
-    object: int = 0  # index of the one that sways or turns
+    object: int | None = None  # index of the one that sways or turns; None: the first that can
     longest: int = LONGEST  # px
 
     def __post_init__(self) -> None:
@@ -204,21 +222,29 @@ def frames(document: Document, clip: Clip, progress: Progress = silent) -> Itera
     small = shrunk(document, times)
     if clip.motion == "morph" and not any(item.is_moved for item in small.objects):
         raise ValueError("nothing was moved, there is nothing to be seen")
-    chosen = small.objects[clip.object].lifted if clip.object < len(small.objects) else None
-    if clip.motion in ("sway", "turn") and chosen is None:
+    turning = _turning(small, clip.object)
+    if clip.motion in ("sway", "turn") and turning is None:
         raise ValueError("lift an object first, then it can turn")
     film = _Film(small, keys)
     for k in range(clip.count):
         progress(k / clip.count, "drawing")
+        time = k / clip.count
         if clip.motion == "morph":
-            shown = film.morphed(share_at(k / clip.count))
+            pixels = film.morph(time)
         elif clip.motion == "keys":
-            shown = film.keyed(k / clip.count)
+            pixels = film.drawn(film.keyed(time))
         else:
-            shown = film.turned(clip.object, _yaw_at(k / clip.count, clip.motion))
-        pixels = to_u8(composite(shown, film.puppets).pixels)
+            pixels = film.drawn(film.turned(turning or 0, _yaw_at(time, clip.motion)))
         height, width = (side - side % 2 for side in pixels.shape[:2])
         yield np.ascontiguousarray(pixels[:height, :width])
+
+
+def _turning(document: Document, wanted: int | None) -> int | None:
+    """The index of the lifted object that is wanted, or else of the first that is seen."""
+    lifted = [k for k, item in enumerate(document.objects) if item.lifted is not None]
+    if wanted is not None:
+        return wanted if wanted in lifted else None
+    return next((k for k in lifted if document.objects[k].is_visible), next(iter(lifted), None))
 
 
 def station_at(time: float, count: int) -> tuple[int, float]:
@@ -239,6 +265,15 @@ def share_at(time: float) -> float:
     return float(0.5 - 0.5 * np.cos(np.pi * share))
 
 
+def refined_at(time: float) -> float:
+    """Return the share of a refinement that is seen at a `time` in [0, 1) of a morph.
+
+    It was made for the edit alone, so that it comes and goes while that is still.
+    """
+    since, left = time - 0.5, 0.5 + HOLD - time  # of the time in which the edit is still
+    return float(np.clip(min(since, left) / (0.3 * HOLD), 0, 1))
+
+
 def _yaw_at(time: float, motion: str) -> float:
     """Degrees."""
     return 360 * time if motion == "turn" else SWAY * float(np.sin(2 * np.pi * time))
@@ -257,20 +292,49 @@ class _Film:
         }
         self._last: dict[int, Pose] = {}  # of each object, to go on from
 
-    def morphed(self, share: float) -> Document:
-        """The document when a `share` of the edit is done."""
+    def drawn(self, document: Document) -> RGB:
+        """The composite of the document at some moment."""
+        return to_u8(composite(document, self.puppets).pixels)
+
+    def morph(self, time: float) -> RGB:
+        """The picture at a `time` in [0, 1) of the way from the photo to the edit and back.
+
+        Objects move; what else the edit changes is faded in: their look, shadows old and new, and
+        what was repaired by hand.
+        """
+        share = share_at(time)
         if share >= 1:
-            return self._document
+            return self.drawn(self._refined(refined_at(time)))
+        moved = self._morphed(share)
+        objects = tuple(map(_as_in_the_photo, moved.objects))
+        plain = replace(moved, objects=objects, plate=_with_old_shadows(moved))
+        is_alike = all(a is b for a, b in zip(objects, moved.objects, strict=True))
+        if (is_alike and plain.plate is moved.plate) or share <= 0:
+            return self.drawn(plain)
+        before, after = (self.drawn(document).astype(np.float32) for document in (plain, moved))
+        return np.rint(before + share * (after - before)).astype(np.uint8)
+
+    def _refined(self, share: float) -> Document:
+        """The document with so much of its refinement."""
+        document = self._document
+        if document.refined is None or share >= 1:
+            return document
+        seen = replace(document.refined, strength=share * document.refined.strength)
+        return replace(document, refined=seen if share > 0 else None)
+
+    def _morphed(self, share: float) -> Document:
+        """The document when its objects have gone a `share` of their way, not refined."""
         objects = tuple(
-            self._between(k, _at_rest(item), item, share)
-            if item.is_moved and item.is_visible
-            else item
+            self._between(k, _at_rest(item), item, share) if item.is_moved else item
             for k, item in enumerate(self._document.objects)
         )
-        return replace(self._document, objects=objects)
+        return replace(self._document, objects=objects, refined=None)
 
     def keyed(self, time: float) -> Document:
-        """The document at a `time` in [0, 1) of the way through its key poses and back."""
+        """The document at a `time` in [0, 1) of the way through its key poses and back.
+
+        Without a refinement, which is of one pose.
+        """
         station, share = station_at(time, len(self._stations))
         start = self._stations[station].objects
         end = self._stations[(station + 1) % len(self._stations)].objects
@@ -278,7 +342,7 @@ class _Film:
             self._between(k, *pair, share) if k in self.puppets else pair[0]
             for k, pair in enumerate(zip(start, end, strict=True))
         )
-        return replace(self._document, objects=objects)
+        return replace(self._document, objects=objects, refined=None)
 
     def turned(self, k: int, yaw: float) -> Document:
         """The document with object `k` turned about its own upright axis, degrees."""
@@ -287,7 +351,8 @@ class _Film:
         old = gimbal.of(item.placement.turn)
         turn = gimbal.turn((old[0] + yaw, old[1], old[2]))
         placement = replace(item.placement, turn=turn)
-        return self._document.with_object(k, replace(item, placement=placement, is_visible=True))
+        turned = replace(item, placement=placement, is_visible=True)
+        return replace(self._document.with_object(k, turned), refined=None)
 
     def _gimbal(self, item: EditObject) -> Gimbal:
         return gimbal_of(item, self._document)
@@ -331,6 +396,35 @@ def _at_rest(item: EditObject) -> EditObject:
     handles = tuple(replace(handle, target=handle.point, turn=None) for handle in item.handles)
     rig = replace(item.rig, shifts=None)
     return replace(item, handles=handles, rig=rig, pose=None, placement=Placement())
+
+
+def _as_in_the_photo(item: EditObject) -> EditObject:
+    """The object where it is, looking as in the photo; one of another photo is not there."""
+    if item.is_visitor:
+        return replace(item, lifted=None, is_visible=False)
+    is_changed = item.finish != AS_IN_THE_PHOTO or item.is_painted or item.shadow.strength > 0
+    if item.lifted is None or (item.is_visible and not is_changed):
+        return item
+    matte = None if item.matte is None else replace(item.matte, paint=None)
+    return replace(
+        item, matte=matte, is_visible=True, finish=AS_IN_THE_PHOTO,
+        shadow=replace(item.shadow, strength=0.0),
+    )  # fmt: skip
+
+
+def _with_old_shadows(document: Document) -> Plate | None:
+    """The plate where objects hide it; elsewhere the photo, with what was repaired there."""
+    plate = document.plate
+    if plate is None or plate.painted is None:
+        return plate
+    is_bare = plate.painted.copy()
+    for item in document.objects:
+        if (matte := item.matte_here) is not None:
+            is_bare &= crop(matte.alpha, matte.box, plate.box) <= 0
+    x0, y0, x1, y1 = plate.box
+    own = document.photo.pixels[y0:y1, x0:x1]
+    pixels = np.where(is_bare[..., None], own, plate.pixels)
+    return replace(plate, pixels=pixels, hole=plate.hole & ~is_bare, painted=None)
 
 
 def _alike(start: Sequence[Handle], end: Sequence[Handle]) -> bool:

@@ -283,7 +283,7 @@ class EditScript:
         "auto, relief, trellis, cupid, triposplat, or a worker",
     )  # fmt: skip
     fill_from: tuple[FillFrom, ...] = _option(
-        (), SOURCES, (OTHER, BACKENDS), "X,Y:X2,Y2[,R]",
+        (), SOURCES, (PHOTO, BACKENDS), "X,Y:X2,Y2[,R]",
         "fill the background within R px of X2,Y2 from around X,Y",
     )  # fmt: skip
     refine: str = _option(

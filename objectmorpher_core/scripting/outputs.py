@@ -158,10 +158,15 @@ class Export:
         return frames(self.document, self.clip, part(self.progress, 0.02, 0.95))
 
     def files(self, what: str, folder: Path) -> dict[Path, bytes]:
-        """Return the frames of a video, or the layers, as the PNG files in a folder."""
+        """Return the frames of a video, or the layers, as the PNG files in a folder.
+
+        Raises ScriptError where frames of a longer video lie there, which would seem to go on.
+        """
         if what == "layers":
             return self._layer_files(folder)
         stem = Path(self.document.photo.name).stem
+        if (old := _frames_beyond(folder, stem, self.clip.count)) is not None:
+            raise ScriptError(f"{old} is of a longer video; choose another folder, or empty it")
         return {
             folder / f"{stem}-{n:04d}.png": encode_picture(Picture(frame), ".png")
             for n, frame in enumerate(self._film())
@@ -263,6 +268,14 @@ def unmoved_cutout(document: Document, thing: EditObject) -> np.ndarray:
     samples = np.zeros((height, width, 4), pixels.dtype)
     samples[box[1] : box[3], box[0] : box[2]] = pixels_from_unit(soft, pixels.dtype)
     return samples
+
+
+def _frames_beyond(folder: Path, stem: str, count: int) -> Path | None:
+    """A frame of a video of more than `count` frames of the same photo in a folder, or None."""
+    frame = re.compile(re.escape(stem) + r"-(\d{4,})\.png")
+    there = sorted(folder.iterdir()) if folder.is_dir() else []
+    found = ((path, frame.fullmatch(path.name)) for path in there)
+    return next((path for path, match in found if match and int(match[1]) >= count), None)
 
 
 def _sampled(samples: np.ndarray, bits: int) -> np.ndarray:

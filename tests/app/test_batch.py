@@ -145,3 +145,35 @@ def test_outputs_keep_their_photos_format_in_a_folder_that_is_made(folder):
     assert Image.open("made/here/three-a.jpg").format == "JPEG"
     assert cli.main([*photos, "-o", "tif", "--format", "tif"]) == 0
     assert sorted(p.name for p in Path("tif").iterdir()) == ["one-a.tif", "three-a.tif"]
+
+
+def test_a_folder_of_photos_gives_all_that_can_be_read(folder):
+    """Also those in formats that are not written, whose edits become PNG files."""
+    _script("a.json", {"move": [9, 4]})
+    script = json.loads(Path("scripts/a.json").read_text())
+    del script["photo"]
+    Path("scripts/a.json").write_text(json.dumps(script))
+    Image.fromarray(PIXELS).save("photos/three.bmp")
+    assert _batch("--photo", "photos") == 0
+    assert _made() == ["one-a.png", "three-a.png", "two-a.png"]
+
+
+def test_what_is_made_beside_the_photos_is_no_photo_of_the_next_run(folder, capsys):
+    _script("a.json", {"move": [9, 4]})
+    script = json.loads(Path("scripts/a.json").read_text())
+    del script["photo"]
+    Path("scripts/a.json").write_text(json.dumps(script))
+    more = ("scripts", "-o", "photos", "--photo", "photos", "--report", "scripts/report.json")
+    for told in ("2 done, 0 kept, 0 failed", "0 done, 2 kept, 0 failed"):
+        assert cli.main(["batch", *more]) == 0
+        assert capsys.readouterr().out.splitlines()[-1] == told
+    assert len(list(Path("photos").iterdir())) == 4
+
+
+def test_the_report_replaces_no_script(folder, capsys):
+    _script("a.json", {"move": [9, 4]})
+    before = Path("scripts/a.json").read_bytes()
+    for scripts in ("scripts/a.json", "scripts"):
+        assert cli.main(["batch", scripts, "-o", "out", "--report", "scripts/a.json"]) != 0
+        assert "is an input" in capsys.readouterr().err
+    assert Path("scripts/a.json").read_bytes() == before

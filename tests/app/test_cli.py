@@ -105,6 +105,19 @@ def test_key_poses_of_the_command_line_are_those_of_a_script(folder):
     assert cli.main(["replay", "e.omorph", "-o", "x.png", *video, "none/frames"]) == 1
 
 
+def test_a_folder_of_frames_holds_one_film(folder, capsys):
+    """What is left of a longer one would seem to go on."""
+    video = ["--turn", "20", "--save-video", "frames", "--seconds"]
+    assert _edit(*video, "0.4") == 0
+    Path("out.png").unlink()
+    before = {path: path.read_bytes() for path in Path("frames").iterdir()}
+    assert _edit(*video, "0.2") == cli.FAILED
+    assert "photo-0005.png is of a longer video" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in Path("frames").iterdir()} == before
+    assert not Path("out.png").exists()
+    assert _edit(*video, "0.4") == 0
+
+
 def test_nothing_to_do_gives_the_photo_back(folder):
     assert _edit() == 0
     assert np.array_equal(_pixels("out.png"), PIXELS)
@@ -352,6 +365,10 @@ def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
     assert a["handles"] == b["handles"]
     assert a["pixels"] == b["pixels"]
     capsys.readouterr()
+    one_name = ["--save-handles", "h.json", "--report", "../" + folder.name + "/h.json"]
+    assert cli.main(["replay", "s.omorph", "-o", "third.png", *one_name]) == cli.FAILED
+    assert "two outputs have the same name" in capsys.readouterr().err
+    assert not Path("h.json").exists() and not Path("third.png").exists()
     assert cli.main(["info", "s.omorph", "--json"]) == 0
     info = json.loads(capsys.readouterr().out)
     assert info["photo"] == {"name": "photo.png", "width": 160, "height": 120, "bits": 8}

@@ -41,9 +41,19 @@ def test_the_settings_it_names_are_those_of_the_panels() -> None:
     source = "".join(path.read_text(encoding="utf-8") for path in PANELS.rglob("*.py"))
     assert set(SETTINGS) <= set(COMMANDS)
     missing = [
-        label for labels in SETTINGS.values() for label in labels if f't("{label}")' not in source
-    ]
+        label for labels in SETTINGS.values() for label in labels
+        if not re.search(rf'(\bt|\bNumber)\("{re.escape(label)}"', source)
+    ]  # fmt: skip
     assert missing == []
+
+
+def test_it_names_every_number_and_every_tick_of_the_panels() -> None:
+    panels = "".join(p.read_text(encoding="utf-8") for p in (PANELS / "panels").rglob("*.py"))
+    labels = re.findall(r'(?:\bNumber|checkbox)\(\s*(?:t\()?"([^"]+)"', panels)
+    assert {"Opacity", "Yaw", "Show it alone"} <= set(labels)
+    known = {label for labels in SETTINGS.values() for label in labels}
+    known |= {command.label for command in COMMANDS.values()}
+    assert set(labels) - known == set()
 
 
 def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Editor) -> None:
@@ -56,6 +66,7 @@ def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Ed
 
     assert first("invert") == ("Invert selection", "invert")
     assert first("thickn") == ("Thickness", "look")
+    assert first("opac") == ("Opacity", "compose")
     assert first("bend a") == ("Bend a part and keep the rest", "")
     assert first("stays pin")[0] == "Pin that stays"
     palette._typed = ""

@@ -194,6 +194,26 @@ def test_beside_an_object_of_the_photo_each_is_edited_by_itself(
     wait_for_jobs(editor)
 
 
+def test_what_would_be_hidden_comes_in_front(editor: Editor, ball: Document) -> None:
+    """A thing that has just come in is seen, also where another one stands nearer."""
+    editor.tabs.open(replace(ball, photo=replace(ball.photo, name="other.png")))
+    editor.placing.move_to(Placement(depth=0.2))  # smaller, and higher in the picture
+    editor.commit("Move")
+    run(editor, "copy_object")
+    editor.tabs.open(ball)
+    run(editor, "paste_object")
+    wait_until(editor, lambda: editor.object is not None and editor.object.is_visitor)
+    wait_for_jobs(editor)
+    assert editor.objects.order() == [0, 1]
+    document = editor.committed
+    assert document is not None
+    seen = (composite(document).pixels != ball.photo.pixels).any(-1)
+    assert seen.mean() > 0.02
+    assert document.objects[0] is ball.objects[0]
+    close_all(editor)
+    wait_for_jobs(editor)
+
+
 def test_in_its_own_photo_it_is_a_copy(editor: Editor, ball: Document) -> None:
     editor.tabs.open(ball)
     run(editor, "copy_object")

@@ -74,6 +74,18 @@ def test_what_is_recovered_and_closed_at_once_is_not_offered_again(editor: Edito
     assert not folder.exists()
 
 
+def test_it_is_offered_after_the_last_of_several_files(editor: Editor, photo_path: Path) -> None:
+    """As the program is started with them: the tabs before the last are left at once."""
+    leave("cat", 9)
+    other = photo_path.with_name("other.png")
+    other.write_bytes(photo_path.read_bytes())
+    editor.recovery.look(is_shown=False)
+    editor.filing.open_all([photo_path, other])
+    wait_until(editor, lambda: editor.tab.name == "other.png" and editor.chores.is_idle)
+    assert editor.message is not None and editor.message.action is not None
+    assert "cat" in editor.message.text
+
+
 def test_discarding_deletes_it(editor: Editor) -> None:
     folder = leave("cat", 9)
     editor.recovery.look()

@@ -8,6 +8,8 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from multiprocessing import Pipe
 from typing import Any
 
@@ -33,6 +35,11 @@ class Line:
         arrived = self._reader.read()
         thread.join()
         return arrived
+
+    def little(self, message: Any) -> Any:
+        """What arrives of a message that the pipe holds."""
+        self._writer.write(message)
+        return self._reader.read()
 
     def close(self) -> None:
         for end in self._ends:
@@ -72,6 +79,38 @@ def test_what_may_change_is_sent_anew(line: Line) -> None:
     assert (line.sent(array) == 1).all()
     array[:] = 2
     assert (line.sent(array) == 2).all()
+
+
+@dataclass(frozen=True, eq=False)
+class Square:
+    """A value that computes something of itself when it is first asked for."""
+
+    side: Side
+    name: str
+
+    @cached_property
+    def area(self) -> float:
+        return self.side.length**2
+
+
+class Side:
+    """Asks for the area of its squares while it is sent, as another thread does."""
+
+    def __init__(self, length: float) -> None:
+        self.length, self.squares = length, list[Square]()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        for square in self.squares:
+            assert square.area == self.length**2
+        return Side, (self.length,)
+
+
+def test_a_value_may_grow_while_it_is_sent(line: Line) -> None:
+    side = Side(3.0)
+    square = Square(side, "first")
+    side.squares.append(square)
+    got = line.little(square)
+    assert (got.side.length, got.name, got.area) == (3.0, "first", 9.0)
 
 
 def test_what_was_forgotten_is_sent_again(line: Line) -> None:

@@ -25,6 +25,8 @@ from objectmorpher_core.document.key_edits import (
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import spun
 from objectmorpher_core.document.pose import Pose
+from objectmorpher_core.document.settings import AS_IN_THE_PHOTO, Refined, Shadow
+from objectmorpher_core.document.visitor_edits import departing, with_visitor
 from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
 from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.scripting.animation import Clip, frames, share_at, shrunk, station_at
@@ -83,6 +85,20 @@ def test_an_object_turns_without_a_jump(motion, up):
     assert np.array_equal(found[0], document.photo.pixels)
     gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
     assert 0 < max(gaps) < 6 * np.median(gaps) + 1
+
+
+@pytest.mark.parametrize("first", ["gone", "never lifted"])
+def test_the_first_object_that_is_seen_and_lifted_turns(first):
+    document = shapes.scene("ellipse").document()
+    thing = document.objects[0]
+    gone = replace(thing, is_visible=False, placement=Placement(move=(9.0, 0.0)))
+    before = gone if first == "gone" else replace(thing, lifted=None, matte=None)
+    document = replace(document, objects=(before, thing))
+    found = list(frames(document, Clip("turn", seconds=1.0, rate=8)))
+    assert np.array_equal(found[0], composite(document).pixels)
+    assert difference(found[2], found[0]) > 1.0
+    named = list(frames(document, Clip("turn", seconds=1.0, rate=8, object=1)))
+    assert all(np.array_equal(a, b) for a, b in zip(found, named, strict=True))
 
 
 def test_between_photo_and_edit_a_thing_that_is_spun_stands():
@@ -279,3 +295,86 @@ def test_a_folder_of_frames_holds_the_film(tmp_path):
     assert [path.name for path in files] == [f"made-{n:04d}.png" for n in range(4)]
     for data, frame in zip(files.values(), frames(document, clip), strict=True):
         assert np.array_equal(np.asarray(Image.open(io.BytesIO(data))), frame)
+
+
+@pytest.mark.parametrize("change", ["removed", "half seen", "multiplied", "visitor", "moved, too"])
+def test_a_morph_begins_as_the_photo_whatever_the_edit_changes(change):
+    """Also where an object goes away, comes from another photo, or only looks otherwise."""
+    document = shapes.scene("ellipse").document()
+    if change == "removed":
+        document = edits.set_visible(document, 0, False)
+    elif change == "visitor":
+        item = replace(departing(document, 0, None), placement=Placement(move=(40.0, 10.0)))
+        item = replace(item, mask=np.zeros_like(item.mask))
+        document = with_visitor(replace(document, objects=(), plate=None), item)
+    else:
+        look = {"blend_mode": "multiply"} if change == "multiplied" else {"opacity": 0.5}
+        document = edits.set_finish(document, 0, replace(AS_IN_THE_PHOTO, **look))
+        if change == "moved, too":
+            document = edits.set_placement(document, 0, Placement(move=(14.0, -6.0)))
+    found = list(frames(document, Clip(seconds=1.0, rate=20)))
+    photo, edit = document.photo.pixels, composite(document).pixels
+    assert difference(photo, edit) > 1
+    assert np.array_equal(found[0], photo)
+    assert np.array_equal(found[10], edit)
+    gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
+    assert max(gaps) < 0.6 * difference(photo, edit)
+
+
+def test_shadows_and_repairs_fade_in_with_a_morph():
+    """The ground beside the object, lightened in the plate, does not change in one picture."""
+    document = shapes.scene("ellipse").document()
+    plate = document.plate
+    assert plate is not None
+    ground = np.zeros_like(plate.hole)
+    ground[100:118, 10:150] = True
+    pixels = np.where(ground[..., None], 255, plate.pixels).astype(np.uint8)
+    plate = replace(plate, pixels=pixels, hole=plate.hole | ground, painted=ground)
+    document = edits.set_plate(document, plate)
+    document = edits.set_placement(document, 0, Placement(move=(14.0, -6.0)))
+    document = edits.set_shadow(document, 0, Shadow(strength=0.8))
+    found = [f[102:116, 20:140] for f in frames(document, Clip(seconds=2.0, rate=20))]
+    photo, edit = (
+        document.photo.pixels[102:116, 20:140],
+        composite(document).pixels[102:116, 20:140],
+    )
+    assert np.array_equal(found[0], photo) and np.array_equal(found[20], edit)
+    whole = difference(photo, edit)
+    gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
+    assert whole > 30 and max(gaps) < 0.25 * whole
+
+
+def refined(document: Document) -> Document:
+    """Refined to half as dark, everywhere in a box around the edit."""
+    pixels = composite(document).pixels[20:90, 30:130] // 2
+    made = Refined(30, 20, pixels, np.full(pixels.shape[:2], 255, np.uint8), "made")
+    return edits.set_refined(document, made)
+
+
+def test_a_refinement_is_seen_only_while_the_edit_is_still():
+    """It was made for that picture: over any other one it would show the object twice."""
+    plain = edited()
+    document = refined(plain)
+    found, expected = (list(frames(d, Clip(seconds=2.0, rate=20))) for d in (document, plain))
+    for k in (*range(21), *range(26, 40)):
+        assert np.array_equal(found[k], expected[k]), k
+    assert np.array_equal(found[23], composite(document).pixels)
+    darker = [difference(found[k], expected[k]) for k in (20, 21, 23)]
+    assert darker[0] < darker[1] <= darker[2]
+    first = [next(frames(d, Clip("sway", seconds=1.0, rate=20))) for d in (document, plain)]
+    assert np.array_equal(*first)
+
+
+@pytest.mark.parametrize("times", [2, 3])
+def test_a_smaller_photo_is_refined_and_blurred_as_the_whole_one(times):
+    moved = edits.set_placement(shapes.scene("ellipse").document(), 0, Placement(move=(14.0, -6.0)))
+    blurred = edits.set_finish(moved, 0, replace(AS_IN_THE_PHOTO, blur=9.0))
+    for document in (refined(edited()), blurred):
+        small = shrunk(document, times)
+        width, height = small.photo.size
+        whole = composite(document).pixels[: height * times, : width * times]
+        expected = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+        assert difference(composite(small).pixels, expected) < 0.3 * difference(
+            expected, small.photo.pixels
+        )
+    assert small.objects[0].finish.blur == 9.0 / times

@@ -191,6 +191,19 @@ def test_orientation(orientation, kind, chelsea):
         np.testing.assert_array_equal(again.pixels, picture.pixels)
 
 
+@pytest.mark.parametrize("orientation", [3, 6, 8])
+def test_exif_says_the_size_of_the_upright_picture(orientation, chelsea):
+    stored = chelsea[:60, :90]
+    exif = exif_block(orientation)
+    exif.get_ifd(0x8769).update({0xA002: 90, 0xA003: 60})  # as cameras store them
+    data = pil_bytes(Image.fromarray(stored), "JPEG", exif=exif)
+    written = Image.open(io.BytesIO(encode_picture(read_picture(data), "jpg"))).getexif()
+    size = (90, 60) if orientation == 3 else (60, 90)
+    own = written.get_ifd(0x8769)
+    assert written[0x0112] == 1 and (own[0xA002], own[0xA003]) == size
+    assert own[0xA405] == 35 and own[0x927C] == b"a maker's note"
+
+
 def with_exif(pixels: np.ndarray, exif: Image.Exif) -> Image.Image:
     return Image.open(io.BytesIO(pil_bytes(Image.fromarray(pixels), "PNG", exif=exif)))
 

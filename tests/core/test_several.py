@@ -201,6 +201,10 @@ BAD = {
         {"objects": [{"stay_in_front": True, "move": [1, 2]}]}, "object 2: 'move' is nothing that",
     ),
     "a camera of its own": ({"objects": [{"fov": 50}]}, "object 2: 'fov' is of the whole photo"),
+    "a fill of its own": (
+        {"objects": [{"fill_from": [{"source": [1, 2], "to": [3, 4]}]}]},
+        "object 2: 'fill_from' is of the whole photo",
+    ),
     "an order of what is not there": ({"order": [1, 2]}, "order: 2 is not a whole number from 1"),
     "one twice in the order": ({"order": [1, 1]}, "order: an object stands there twice"),
 }  # fmt: skip

@@ -7,6 +7,7 @@ was stopped goes on where it was. Each edit may be made on another machine (`ser
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Iterator
@@ -14,8 +15,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.base.files import make_folder, write_all
-from objectmorpher_core.pictures.image import ENDINGS, encode_picture
+from objectmorpher_core.base.files import make_folder, read_input, write_all
+from objectmorpher_core.pictures.image import ENDINGS, READ_ENDINGS, encode_picture
 from objectmorpher_core.scripting.options import files_of
 from objectmorpher_core.scripting.script import (
     BatchItem,
@@ -50,7 +51,8 @@ class Task:
 def run_batch(options: argparse.Namespace) -> None:
     """`objectmorpher batch`. Raises RuntimeError at the end where an edit has failed."""
     if options.report:
-        check_outputs([], {options.report: (".json",)})
+        scripts = [path for path in _files(options.scripts, (".json",)) if not _is_report(path)]
+        check_outputs(scripts, {options.report: (".json",)})
     if options.out is not None and options.out.exists() and not options.out.is_dir():
         raise UsageError(f"{options.out} is no folder")
     check_ray(options)
@@ -77,6 +79,15 @@ def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
         write_all({report: json_bytes({"version": 1, **counts, "edits": entries})})
     if counts["failed"]:
         raise RuntimeError(f"{counts['failed']} of {len(entries)} edits failed")
+
+
+def _is_report(path: Path) -> bool:
+    """Whether a file is what `_finish` has written."""
+    try:
+        told = json.loads(read_input(path))
+    except (ValueError, OSError, RecursionError):
+        return False
+    return isinstance(told, dict) and {"version", "edits"} <= told.keys()
 
 
 def _entries(
@@ -172,10 +183,24 @@ def _say(entry: dict[str, Any]) -> None:
 
 
 def _tasks(options: argparse.Namespace) -> Iterator[Task]:
-    """All edits in their order. One that makes no sense is a task that fails."""
-    photos = _files(options.photo or [], ENDINGS)
+    """All edits in their order. One that makes no sense is a task that fails.
+
+    What is made in a folder of photos is no photo of this folder when the batch is run again.
+    """
+    photos = _files(options.photo or [], READ_ENDINGS)
+    tasks = list(_tasks_with(photos, options))
+    named = set(options.photo or [])
+    outs = {Path(task.item.out).resolve() for task in tasks if task.item and task.item.out}
+    own = [photo for photo in photos if photo in named or photo.resolve() not in outs]
+    return iter(tasks) if own == photos else _tasks_with(own, options)
+
+
+def _tasks_with(photos: list[Path], options: argparse.Namespace) -> Iterator[Task]:
     taken: set[Path] = set()
+    report = options.report and options.report.resolve()
     for script in _files(options.scripts, (".json",)):
+        if script.resolve() == report:  # of the run before
+            continue
         try:
             items = read_scripts(script)
         except (ValueError, OSError) as error:

@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -119,8 +120,7 @@ def run_edit(options: argparse.Namespace) -> None:
             _check_folder(extras[name])
         check_outputs(inputs, {path: _endings(EXTRAS[name]) for name, path in files.items()})
         everything = [*outputs, out, *extras.values()]
-        if len({path.resolve() for path in everything}) < len(everything):
-            raise UsageError("two outputs have the same name")
+        _check_distinct(everything)
         refuse_missing(item.script, item.others)
         written, line = _edit_one(item, extras, clip)
         outputs |= written
@@ -211,12 +211,9 @@ def run_replay(options: argparse.Namespace) -> None:
     from objectmorpher_core.session.file import encode_session, load_session
 
     wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
-    for path, endings in (
-        (options.report, (".json",)), (options.save_handles, (".json",)),
-        (options.save_mesh, OUTPUTS["mesh"]), (options.save_session, (".omorph",)),
-    ):  # fmt: skip
-        if path:
-            wanted[path] = endings
+    further = (options.report, options.save_handles, options.save_mesh, options.save_session)
+    kinds = ((".json",), (".json",), OUTPUTS["mesh"], (".omorph",))
+    wanted |= {path: kind for path, kind in zip(further, kinds, strict=True) if path}
     video, clip = options.save_video, Clip(options.video, options.seconds)
     if video and _is_folder("save_video", video):
         _check_folder(video)
@@ -224,6 +221,7 @@ def run_replay(options: argparse.Namespace) -> None:
         wanted[video] = _endings("video")
     inputs = [options.session, *([options.handles] if options.handles else [])]
     check_outputs(inputs, wanted)
+    _check_distinct(path for path in (options.out, *further, video) if path)
     with progress_bar("Opening") as progress:
         document = load_session(options.session)
         if options.handles:
@@ -371,6 +369,13 @@ def check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> N
             raise UsageError(f"{path}: the ending must be {' or '.join(endings)}")
         if not path.parent.is_dir():
             raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
+
+
+def _check_distinct(outputs: Iterable[Path]) -> None:
+    """Refuses two outputs of one name, of which only the last would be there."""
+    names = [path.resolve() for path in outputs]
+    if len(set(names)) < len(names):
+        raise UsageError("two outputs have the same name")
 
 
 def _mask(document: Document) -> Mask:

@@ -17,19 +17,27 @@ SETTINGS: dict[str, tuple[str, ...]] = {
     "preferences": ("Theme", "Text size", "Language", "Motion", "Screen colours", "File dialogs",
                     "Long jobs"),
     "select": ("Select by", "Keep in front"),
-    "mask": ("Brush", "Radius", "Hardness", "Distance", "Edge", "Decontaminate", "Depth", "Hidden"),
+    "mask": (
+        "Brush", "Radius", "Hardness", "Distance", "Edge", "Decontaminate", "Clean", "Depth",
+        "Hidden",
+    ),
     "pose": (
         "Rigidity", "What stays", "Symmetry", "Drag the mirrored point too", "Rotation ring (R)",
         "Anchors", "Regions", "Influence of the handle", "Strain", "Softness", "Stiffness", "Turn",
+        "X", "Y", "Depth", "Pin: it holds still", "Turns with the object",
     ),
-    "place": ("Move over the ground",),
+    "place": (
+        "Move over the ground", "Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "From above",
+        "Scale",
+    ),
     "look": (
         "Thickness", "Learned shape", "It stands in the photo", "Use the depth model", "Zoom",
-        "Before and after",
+        "Before and after", "Kind", "Other side", "Symmetry",
     ),
     "compose": (
-        "Show it alone", "Shadow", "Strength", "Length", "Contact", "Ground", "Light", "Blend",
-        "Network", "Amount",
+        "Show it alone", "Opacity", "Exposure", "Warmth", "Saturation", "Sharpness", "Blur",
+        "Blend mode", "Shadow", "Strength", "Length", "Softness", "Contact", "Ground", "Falls to",
+        "Falls on walls and steps", "Light", "Grain", "Focus", "Blend", "Network", "Amount",
     ),
 }  # fmt: skip
 

@@ -142,6 +142,7 @@ class Editor(EditorState):
         That may be gigabytes.
         """
         self._stop()
+        self.recovery.put_off()
         self.message, self.hover = None, Hover()
         self._forget_derived()
 

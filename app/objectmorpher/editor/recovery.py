@@ -19,7 +19,7 @@ from ..canvas.shape import Shapes, build_ready
 from ..system.texts import t
 from ..worker.requests import JobError
 from .autosave import LOCK, FileLock, HeldJournal, recovery_root
-from .view import Action
+from .view import Action, StatusMessage
 
 if TYPE_CHECKING:
     from .state import EditorState
@@ -51,6 +51,7 @@ class Recovery:
         self._editor, self._tabs = editor, tabs
         self.left: tuple[Left, ...] = ()  # newest first
         self._is_unseen = False
+        self._offer: StatusMessage | None = None
 
     def look(self, is_shown: bool = True) -> None:
         """Reads the list anew; cheap, the documents are not read.
@@ -84,6 +85,12 @@ class Recovery:
             text = t("Unsaved work of {count} earlier sessions is still here",
                      count=len(self.left))  # fmt: skip
             editor.say(text, Action(t("Show"), self._tabs.add))
+        self._offer = editor.message
+
+    def put_off(self) -> None:
+        """The tab is left: what is still offered there is offered again when a file has opened."""
+        if self._offer is not None and self._editor.message is self._offer:
+            self._is_unseen = True
 
     def discard(self, left: Left) -> None:
         """Deletes it for good."""

@@ -17,6 +17,7 @@ import pickle
 import socket
 import sys
 from collections import OrderedDict
+from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
@@ -145,6 +146,18 @@ class _Pickler(pickle.Pickler):
 
     def persistent_id(self, obj: Any) -> int | None:
         return self._writer.key(obj)
+
+    def reducer_override(self, obj: Any) -> Any:
+        """What the window's thread computes of a value while it is sent is left out.
+
+        A cached property is kept among the value's fields, which must not grow under the pickler.
+        """
+        if not is_dataclass(type(obj)):
+            return NotImplemented
+        reduced = obj.__reduce_ex__(pickle.HIGHEST_PROTOCOL)
+        if isinstance(reduced, str) or len(reduced) < 3 or type(reduced[2]) is not dict:
+            return NotImplemented
+        return (*reduced[:2], dict(reduced[2]), *reduced[3:])
 
 
 class _Unpickler(pickle.Unpickler):

@@ -323,6 +323,8 @@ class Pasting:
 
     def paste(self) -> None:
         """The copied object in the photo that is shown, as one step, when it can be drawn."""
+        from objectmorpher_core.compose.order import brought_into_sight
+
         editor, document, copied = self._editor, self._editor.committed, self._copied
         if document is None or copied is None or editor.hand.is_busy:
             return
@@ -351,7 +353,10 @@ class Pasting:
                 visitor = replace(visitor, shadow=replace(visitor.shadow, strength=USUAL_SHADOW))
             editor.hand.abort(editor)
             editor.derived.remember(visitor, shape)
-            self._show(visitor_edits.with_visitor(now, visitor), visitor.name)
+            there = visitor_edits.with_visitor(now, visitor)
+            posed = partial(editor.derived.posed, there)
+            there = brought_into_sight(there, len(now.objects), posed)
+            self._show(there, visitor.name)
 
         editor.chores.start(
             t("Pasting"), lambda progress: build(), kind=PASTE, done=accept,
