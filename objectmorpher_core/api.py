@@ -23,7 +23,7 @@ from .base.files import read_input, write_all
 from .base.progress import Bar, Progress, as_progress
 from .base.quoting import named, shown
 from .document.model import Document
-from .pictures.image import array_of, encode_array, encode_mask, encode_pil, pil_of
+from .pictures.image import array_of, encode_array, encode_coverage, encode_mask, encode_pil, pil_of
 from .pipeline import Edited, continue_script, lift_first, open_photo, select
 from .pipeline import replay as replay_document
 from .scripting.animation import Clip, frames
@@ -146,12 +146,14 @@ class Edit:
         return self.options(subject=True)
 
     def mask(self, mask: File | np.ndarray) -> Edit:
-        """The object is what a mask picture, or a bool array (H, W), covers."""
+        """The object is what a mask picture, or an array (H, W), covers: bool, or soft u8."""
         if not isinstance(mask, np.ndarray):
             return replace(self._unlifted, own_mask=_read(mask)[0])
-        if mask.dtype != np.bool_ or mask.ndim != 2:
-            raise ValueError(f"a mask is (H, W) of bool, not {mask.shape} of {mask.dtype}")
-        return replace(self._unlifted, own_mask=encode_mask(mask))
+        if mask.dtype not in (np.bool_, np.uint8) or mask.ndim != 2:
+            raise ValueError(f"a mask is (H, W) of bool or uint8, not {mask.shape} of {mask.dtype}")
+        is_hard = mask.dtype == np.bool_ or mask.max(initial=0) <= 1  # 0 and 1 say no and yes
+        own = encode_mask(mask > 0) if is_hard else encode_coverage(mask)
+        return replace(self._unlifted, own_mask=own)
 
     @cached_property
     def selection(self) -> Mask:

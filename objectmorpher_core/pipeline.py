@@ -44,7 +44,7 @@ from .lift.beyond_frame import cut_out_beyond
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
 from .lift.registration.other_photo import OtherPhoto, with_photo
 from .lift.relief.depth_look import look_at_all
-from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
+from .pictures.image import ImageError, Picture, read_coverage, read_picture, to_u8
 from .raster.posed import PosedSplats
 from .scripting import runner
 from .scripting.background import PlateAhead
@@ -370,7 +370,8 @@ class _Run:
             raise ScriptError("no object is chosen: use click, box, subject or mask")
         with self.stopwatch.stage("segment"):
             if mask is not None:
-                found, backend = read_mask(mask, self.document.photo.size), "mask"
+                found: Selection = read_coverage(mask, self.document.photo.size)
+                backend = "mask"
             else:
                 reading = self._reading(script.segment, part(progress, 0.0, 0.6))
                 wanted = edits.beside(self.document, len(self.document.objects), prompt)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image, ImageCms, ImageShow
@@ -227,6 +228,19 @@ def test_the_selection_is_what_is_edited(folder):
     assert np.array_equal(om.open(shapes.png(PIXELS)).mask(MASK).selection, MASK)
     clicked = om.open("photo.png").options(segment="grabcut").click(78, 62).selection
     assert (clicked & MASK).sum() / (clicked | MASK).sum() > 0.8
+
+
+def test_a_soft_mask_keeps_its_edge() -> None:
+    soft = cv2.GaussianBlur(np.where(MASK, np.uint8(255), np.uint8(0)), (0, 0), 4)
+    edit = om.open(shapes.png(PIXELS)).mask(soft)
+    assert np.array_equal(edit.selection, soft >= 128)
+    matte = edit.lift(gaussians=300).document.objects[0].matte
+    assert matte is not None
+    x0, y0, x1, y1 = matte.box
+    off = np.abs(matte.alpha - soft[y0:y1, x0:x1] / 255)
+    assert off.max() < 0.02
+    numbers = MASK.astype(np.uint8)  # 0 and 1
+    assert np.array_equal(om.open(shapes.png(PIXELS)).mask(numbers).selection, MASK)
 
 
 def test_figures_and_pixels_are_plain(folder):
