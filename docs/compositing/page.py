@@ -116,13 +116,14 @@ all directions and lengths, and what explains the photo best is asked how much s
 small network sees the same surroundings: a U-Net of 0.64 million weights that reads 96 x 96 cells
 about the thing (`objectmorpher_core/models/shadow.onnx`, 1.3 MB, Apache-2.0, SHA-256
 `{shadow_network}`). It was trained
-from nothing, in 4,400 steps on 64,000 pictures of 2,900 made scenes, within an hour on two busy
+from nothing, in 8,700 steps on 134,000 pictures of 2,900 made scenes, within two hours on two busy
 cores (`objectmorpher train shadow`): things of boxes, balls, cylinders and boards, on photographed
 and drawn grounds, under one or two lamps, with neighbours, walls, patches and shades of something
 else; four in ten have no shadow of the thing. No solid and no scene on this page was trained on,
 nor any photograph of the half below that was held out; parts of those of the other half were, as
 grounds and backgrounds, the cup's photo among them. Where the network sees shade says which of
-the shadows that were tried it is; how sure it is counts most in whether there is one.
+the shadows that were tried it is, and how sure it is decides whether there is one, but for a
+silhouette that explains so much that it is certain by itself.
 
 Whether anything is imagined is asked of 1,000 scenes (`python docs/compositing/imagined.py`):
 solids and upright pictures on photographed and drawn grounds, with walls, neighbours, edges of

@@ -84,10 +84,10 @@ def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
 def _is_report(path: Path) -> bool:
     """Whether a file is what `_finish` has written."""
     try:
-        told = json.loads(read_input(path))
+        report = json.loads(read_input(path))
     except (ValueError, OSError, RecursionError):
         return False
-    return isinstance(told, dict) and {"version", "edits"} <= told.keys()
+    return isinstance(report, dict) and {"version", "edits"} <= report.keys()
 
 
 def _entries(

@@ -74,12 +74,11 @@ WEIGHTS = {
     "gain": 2.62, "others": -1.47, "joined": 1.79, "whole": 1.97, "tint": -1.08, "behind": 2.77,
 }  # fmt: skip
 BIAS = -4.81
-JOINT = 0.3  # weight of the sum of these, beside the network's log odds
 CERTAIN = 5.0  # of that sum, which is enough by itself: none of 437 scenes without a shadow has it
 SHADED = (0.05, 0.25)  # natural logarithm of light that was fitted, over which it becomes a shade
 MOST_TINT = 0.6  # x its darkness: what changes colours by more is another material
-SURE = 2.3  # margin: 2 of 263 scenes without a shadow have a higher score, of others 9 of 295
-LIKELY = 0.6  # margin where somebody has asked for the shadow, sees it outlined, and can refuse
+SURE = 2.5  # log odds: 3 of 263 scenes without a shadow have a higher score, of others 3 of 295
+LIKELY = 1.1  # those where somebody has asked for the shadow, sees it outlined, and can refuse
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +142,7 @@ def score(
     if numbers["tint"] > MOST_TINT:
         return -np.inf
     fit = sum(weight * numbers[name] for name, weight in WEIGHTS.items()) + BIAS
-    return max(JOINT * fit + looked.odds, SURE + fit - CERTAIN)
+    return max(looked.odds, SURE + fit - CERTAIN)
 
 
 def overlap(seen: Surroundings, found: TriedShadow, looked: SeenShadow) -> float:
