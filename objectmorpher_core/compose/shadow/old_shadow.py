@@ -250,9 +250,9 @@ def _mean(picture: F32, weight: F32, sigma: float) -> F32:
 
 
 CALM = 0.7, 1.6  # natural logarithm of missing light, from which colours are smooth, and wholly so
-CALM_REACH, CALM_EPS = 16, 0.003  # px: two blocks of a JPEG file; how much brighter is no edge
+CALM_REACH, CALM_EPS = 16, 0.003  # px: two blocks of a JPEG file; variance that is no edge
 CALM_GUIDE = 2.0  # px, over which that is measured
-LEAST_KNOWN = np.float32(0.05)
+LEAST_KNOWN = np.float32(0.05)  # of the px around, that must be in the shade
 EDGE_PX, EDGE_CELLS = 2.0, 0.15  # px and cells: half the width of a hard edge, which is invented
 SPECK = 7  # px
 EDGE_WIDTH = 1.2  # px: the first px on either side

@@ -44,10 +44,8 @@ BAND_BLUR = 0.03  # x height
 BAND_DROP = 0.015  # x height that the contact lies below the object
 FROM_ABOVE = 90.0  # degrees, at which a ground is seen: the shadow is the outline itself
 FLAT_HEIGHT = 6.0  # x that height, the shorter side of what is seen from above
-CRISP, CELLS = (
-    4,
-    1.5,
-)  # x as fine is a sharp outline; cells of what it is found on, that are looked at
+CRISP = 4  # x as fine is a sharp outline as the grid on which it is found
+CELLS = 1.5  # of that grid, over which its points are counted: fewer leave holes
 FARTHEST = 2.0  # x the photo's diagonal, of an object whose shadow is cast
 DARKEST = 0.97  # of the light, at strength 1
 FAINTEST = 1 / 255  # what is weaker is none: the footprint ends somewhere

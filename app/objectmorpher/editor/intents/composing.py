@@ -87,9 +87,9 @@ class ShadowOffer:
 
 def _offer_of(document: Document, k: int, answer: tuple[Shadow, Plate]) -> ShadowOffer:
     shadow, plate = answer
-    told = document.objects[k].shadow.ground
-    if told is not None or document.horizon is not None:
-        shadow = replace(shadow, ground=told)
+    ground = document.objects[k].shadow.ground
+    if ground is not None or document.horizon is not None:  # it was known how one looks at it
+        shadow = replace(shadow, ground=ground)
     return ShadowOffer(document, k, shadow, plate)
 
 
