@@ -29,7 +29,7 @@ def test_colours_are_nearer_to_what_was_cut_off_than_a_mirror_image(name: str) -
         assert np.array_equal(made.alpha, mirrored.alpha)
         first = cut - mirrored.left
         assert np.array_equal(made.foreground[:, :first], mirrored.foreground[:, :first])
-        x0, y0, x1, y1 = mirrored.box
+        _, y0, x1, y1 = mirrored.box
         truth, there = pixels[y0:y1, cut:x1] / 255, inside[y0:y1, cut:x1]
         own = there & (mirrored.alpha[:, first : first + there.shape[1]] > 0.5)
         errors.append([
