@@ -37,7 +37,7 @@ class Asked:
         if function is job_functions.cut_edit:
             (self.document,) = arguments
             done(function(*arguments, progress=silent))
-        else:
+        elif function is not job_functions.take_shadow:  # nobody asks for that: it is looked for
             assert function is job_functions.refine
             (self.edit, self.how), self.done = arguments, done
 
