@@ -13,11 +13,12 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, U8, Mask, Pixels
+from ...base.arrays import F32, Mask, Pixels
 from ...base.pixels import crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, silent
 from ...document.model import Plate
 from ...document.settings import Hint, Shadow
+from ...segment.matting.soft_edge import signed_distance
 from .. import Inpainter
 from ..plate.plate import Box, build_plate, cut, hole_margin, overlap
 from ..silhouette import cells_bounds, sampled
@@ -226,11 +227,7 @@ def _from_edge(missing: F32, pitch: float) -> F32:
     is_shade = missing > np.maximum(HALF * deepest, SEEN_EDGE)
     if not is_shade.any() or is_shade.all():
         return np.zeros_like(missing)
-    outside, inside = (
-        cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
-        for part in (~is_shade, is_shade)
-    )
-    return np.asarray(np.where(is_shade, 0.5 - inside, outside - 0.5), np.float32)
+    return -signed_distance(is_shade)
 
 
 def _stops(far: float) -> list[float]:
@@ -253,9 +250,9 @@ CALM = 0.7, 1.6  # natural logarithm of missing light, from which colours are sm
 CALM_REACH, CALM_EPS = 16, 0.003  # px: two blocks of a JPEG file; variance that is no edge
 CALM_GUIDE = 2.0  # px, over which that is measured
 LEAST_KNOWN = np.float32(0.05)  # of the px around, that must be in the shade
-EDGE_PX, EDGE_CELLS = 2.0, 0.15  # px and cells: half the width of a hard edge, which is invented
-SPECK = 7  # px
-EDGE_WIDTH = 1.2  # px: the first px on either side
+EDGE_PX, EDGE_CELLS = 1.5, 0.15  # px and cells: half the width of a hard edge, which is invented
+SPECK = 7  # px, of what is no part of a shade, and no hole in one
+EDGE_WIDTH = 0.7  # px: the first px on either side
 LOST = 1.1  # natural logarithm of missing light, from which the ground is invented
 SEEN = 1 / 512  # of encoded light: less is no shadow
 BLACK = 0.02  # of linear light, below which a logarithm says little
@@ -412,11 +409,7 @@ def _is_edge(missing: F32, pitch: float) -> Mask:
 
 def _from_hard_edge(missing: F32) -> F32:
     """(h, w) px from the edge, on either side. Specks of the ground have none."""
-    is_shade = _without_specks(missing > HALF * float(missing.max()))
-    inside, outside = (
-        cv2.distanceTransform(part, cv2.DIST_L2, 5) for part in (is_shade, 1 - is_shade)
-    )
-    return np.asarray(np.maximum(inside, outside), np.float32)
+    return np.abs(signed_distance(_without_specks(missing > HALF * float(missing.max()))))
 
 
 def edge_blur(pixels: Pixels, old: OldShadow) -> float | None:
@@ -437,16 +430,15 @@ def edge_blur(pixels: Pixels, old: OldShadow) -> float | None:
 def _is_joined(into: F32, core: Mask, pitch: float) -> Mask:
     """(h, w) the shade, where one is half `into` it, that holds the `core`; with its edge."""
     is_shade = _without_specks(into > HALF)
-    _, labels = cv2.connectedComponents(is_shade)
-    found = np.unique(labels[core & (is_shade > 0)])
-    away = cv2.distanceTransform((~np.isin(labels, found)).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.asarray(away < EDGE_PX + EDGE_CELLS * pitch, np.bool_)
+    _, labels = cv2.connectedComponents(is_shade.astype(np.uint8))
+    joined = np.isin(labels, np.unique(labels[core & is_shade]))
+    return np.asarray(signed_distance(joined) > -(EDGE_PX + EDGE_CELLS * pitch), np.bool_)
 
 
-def _without_specks(mask: Mask) -> U8:
+def _without_specks(mask: Mask) -> Mask:
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (SPECK, SPECK))
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
-    return np.asarray(cv2.morphologyEx(closed, cv2.MORPH_OPEN, kernel), np.uint8)
+    return cv2.morphologyEx(closed, cv2.MORPH_OPEN, kernel) > 0
 
 
 def traceless_plate(

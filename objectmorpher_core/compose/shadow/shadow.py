@@ -126,7 +126,7 @@ class StandingObject:
         self._above = np.maximum(above - _level(points, above, float(np.clip(sine, 0, 1))), 0.0)
         self._feet = points + self._above[:, None] * normal
         sides = np.ptp(np.percentile(points[:, :2], (SPRAY, 100 - SPRAY), 0), 0)
-        self._flat = max(float(sides.min()), 1e-9) / FLAT_HEIGHT
+        self._side = max(float(sides.min()), 1e-9)  # the shorter one, seen from above
         self._is_low = self._above <= BAND * self.height
         self._right = np.array([1.0, 0.0, 0.0])
         self._nearer = np.cross(normal, self._right)  # on the ground, towards the viewer
@@ -169,7 +169,7 @@ class StandingObject:
         if shadow.ground == FROM_ABOVE:  # all of it is as far from the ground
             cover = _outline(self._fallen(shadow)[is_higher], grid, self.camera)
             blur = last_blur(shadow) - LAST_BLURS[0]  # of a hard one, a photo shows less
-            return self._smooth(cover, blur * FLAT_HEIGHT * self._flat / self.height * size)
+            return self._smooth(cover, blur * self._side / self.height * size)
         cover, share = _spread(self._fallen(shadow)[is_higher], high, grid, self.camera)
         share = np.clip(share, 0, 1)
         mixed = np.zeros_like(cover)
@@ -221,7 +221,7 @@ class StandingObject:
         outline, beside itself. How high it is does not show, and is said by how large it is.
         """
         if shadow.ground == FROM_ABOVE:
-            return np.full(len(self._above), self._flat)
+            return np.full(len(self._above), self._side / FLAT_HEIGHT)
         return self._above
 
     def _smooth(self, values: F32, sigma: float) -> F32:
