@@ -128,7 +128,7 @@ def measured(name: str) -> tuple[Pixels, Pixels, dict[str, Filled]]:
     for way, fill in ways.items():
         begun = time.process_time()
         filled = fill(photo * ~hole[..., None], hole)
-        found[way] = _scored(photo, filled, hole, around, time.process_time() - begun)
+        found[way] = scored(photo, filled, hole, around, time.process_time() - begun)
     return photo[around], cut[around], found
 
 
@@ -140,9 +140,10 @@ def _middle(hole: Mask) -> Mask:
     return small
 
 
-def _scored(
+def scored(
     photo: Pixels, filled: Pixels, hole: Mask, around: tuple[slice, slice], seconds: float
 ) -> Filled:
+    """How far a fill of a `hole` (h, w) is from the photo; networks see what is `around` it."""
     psnr, blurred = (
         10 * np.log10(255**2 / max(((p.astype(float) - photo)[hole] ** 2).mean(), 1e-9))
         for p in (filled, cv2.GaussianBlur(filled, (0, 0), BLUR))

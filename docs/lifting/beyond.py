@@ -9,45 +9,34 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from sheet import PHOTOS, lifted
-from skimage.metrics import structural_similarity
 
-from objectmorpher_core import models
-from objectmorpher_core.base.arrays import F32, RGB, Mask
+from objectmorpher_core.base.arrays import RGB, Mask
+from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document.model import Matte
 from objectmorpher_core.lift.beyond_frame import with_beyond
-from objectmorpher_core.segment import dino_tokens
 from objectmorpher_core.segment.mask_edit import is_selected
 from objectmorpher_core.segment.matting.matte import cut_out
-from objectmorpher_research.evaluation.measures.hed_vgg import WEIGHT, read_hed_vgg
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from tests.photos import outlined, photo
+HERE = Path(__file__).resolve()
+sys.path += [str(HERE.parents[1] / "compositing"), str(HERE.parents[2])]
+from plates import Filled, scored  # noqa: E402
+
+from tests.photos import outlined, photo  # noqa: E402
 
 KEPT = 0.7  # of the object's length, where its photo is cut
 LEAST = 12  # px of the strip, and the root of what is compared
-TILE = 14 * 16  # px of what DINOv2 and HED-VGG compare
+TILE = 14 * 16  # px of what DINOv2 compares
+MOST = 50.0  # dB
 OUTLINED = {
     "astronaut": ("face", "flag", "helmet", "shuttle", "patch", "valve"),
     "flower": ("second_flower",), "china": ("pagoda",),
     "motorcycle": ("motorcycle", "headlight", "seat"),
     "camera": ("cameraman", "tower"), "coins": ("coin", "dim_coin"),
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Beyond:
-    """How far a continuation is from what was cut off."""
-
-    psnr: float  # dB
-    ssim: float
-    unlike: float  # 1 - cosine of DINOv2's tokens
-    hed: float  # HED-VGG
 
 
 def chosen_on() -> Iterator[tuple[RGB, Mask]]:
@@ -66,51 +55,31 @@ def held_out() -> Iterator[tuple[RGB, Mask]]:
             yield photo(source), outlined(name)
 
 
-def compared(pixels: RGB, inside: Mask) -> tuple[Beyond, Beyond] | None:
+def compared(pixels: RGB, inside: Mask) -> tuple[Filled, Filled] | None:
     """What is cut off at the right, continued mirrored and by patches; None: too little."""
     columns = np.flatnonzero(inside.any(0))
     cut = int(columns[0] + KEPT * np.ptp(columns))
     if not inside[:, cut - 1].any():
         return None
     mirrored = cut_out(pixels[:, :cut], inside[:, :cut])
-    first = cut - mirrored.left
-    x0, y0, x1, y1 = mirrored.box
-    x1, y1, top = min(x1, pixels.shape[1]), min(y1, len(pixels)), max(y0, 0)
-    window = slice(top - y0, y1 - y0), slice(max(-x0, 0), x1 - x0)
-    truth, there = pixels[top:y1, max(x0, 0) : x1], inside[top:y1, max(x0, 0) : x1]
-    own = there & (mirrored.alpha[window] > 0.5)
-    own[:, : first - window[1].start] = False
-    if x1 - cut < LEAST or own.sum() < LEAST**2:
+    height, width = inside.shape
+    alpha = crop(mirrored.alpha, mirrored.box, (0, 0, width, height))
+    own = inside & (alpha > 0.5)
+    own[:, :cut] = False
+    if min(np.ptp(np.flatnonzero(own.any(0)), initial=0), own.sum() ** 0.5) < LEAST:
         return None
-    made = with_beyond(mirrored, (cut, len(pixels)))
-
-    def against(matte: Matte) -> Beyond:
-        return _scored(truth, matte.foreground[window], own)
-
-    return against(mirrored), against(made)
-
-
-def _scored(truth: RGB, colors: F32, own: Mask) -> Beyond:
-    error = float(((255.0 * colors - truth)[own] ** 2).mean())
-    levels = np.clip(np.rint(255 * colors), 0, 255).astype(np.uint8)
-    shown = np.where(own[..., None], levels, truth)
-    _, alike = structural_similarity(truth, shown, channel_axis=2, full=True)
     rows, columns = np.nonzero(own)
-    side = min(max(np.ptp(rows), np.ptp(columns), TILE // 2) + 1, *own.shape)
-    top = int(np.clip(rows.mean() - side / 2, 0, len(own) - side))
-    left = int(np.clip(columns.mean() - side / 2, 0, own.shape[1] - side))
-    window = slice(top, top + side), slice(left, left + side)
-    pair = [cv2.resize(np.ascontiguousarray(p[window]), (TILE, TILE)) for p in (truth, shown)]
-    tokens = [dino_tokens.shared().tokens(picture) for picture in pair]
-    one, other = (t / np.linalg.norm(t, axis=-1, keepdims=True) for t in tokens)
-    share = cv2.resize(own[window].astype(np.float32), (16, 16), interpolation=cv2.INTER_AREA)
-    where = share > min(0.2, 0.5 * float(share.max()))
-    there = cv2.resize(own[window].astype(np.uint8), (TILE, TILE)).astype(np.float64)
-    (seen,) = read_hed_vgg(models.fetch(WEIGHT))(*pair, [there])
-    return Beyond(
-        10 * float(np.log10(255**2 / max(error, 0.01))),
-        float(alike[own].mean()), float(1 - (one * other).sum(-1)[where].mean()), seen,
-    )  # fmt: skip
+    side = min(max(np.ptp(rows), np.ptp(columns), TILE // 2) + 1, height, width)
+    top = int(np.clip(rows.mean() - side / 2, 0, height - side))
+    left = int(np.clip(columns.mean() - side / 2, 0, width - side))
+    around = (slice(top, top + side), slice(left, left + side))
+
+    def against(matte: Matte) -> Filled:
+        colors = crop(matte.foreground, matte.box, (0, 0, width, height))
+        levels = np.clip(np.rint(255 * colors), 0, 255).astype(np.uint8)
+        return scored(pixels, np.where(own[..., None], levels, pixels), own, around, 0.0)
+
+    return against(mirrored), against(with_beyond(mirrored, (cut, height)))
 
 
 def table(cases: Iterator[tuple[RGB, Mask]]) -> list[str]:
@@ -121,10 +90,11 @@ def table(cases: Iterator[tuple[RGB, Mask]]) -> list[str]:
         for turns in range(4)
         if (pair := compared(*(np.ascontiguousarray(np.rot90(p, turns)) for p in (pixels, inside))))
     ]
-    figures = np.array([[list(vars(b).values()) for b in pair] for pair in pairs])
+    figures = np.array([[(f.psnr, f.ssim, f.unlike, f.hed) for f in pair] for pair in pairs])
+    figures[..., 0] = figures[..., 0].clip(0, MOST)  # of one colour, some are right
     rows = [f"| {len(pairs)} cuts | PSNR | SSIM | unlike | HED |", "|---|---:|---:|---:|---:|"]
     for name, way in zip(("mirrored", "patches"), np.moveaxis(figures, 1, 0), strict=True):
-        psnr, ssim, unlike, hed = way.mean(0)
+        psnr, ssim, unlike, hed = np.nanmean(way, 0)
         rows.append(f"| {name} | {psnr:.2f} | {ssim:.3f} | {unlike:.3f} | {hed:.3f} |")
     better = (figures[:, 1] - figures[:, 0]) * [1, 1, -1, -1] > 0
     rows.append("| patches are better | " + " | ".join(f"{b:.0%}" for b in better.mean(0)) + " |")

@@ -13,7 +13,7 @@ from objectmorpher.canvas.layer import FrameObject
 from objectmorpher.canvas.layers import FRAME
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.intents.composing import SHADOW
+from objectmorpher.editor.intents.old_shadows import SHADOW
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.brush_tools import ComposeTool
 from objectmorpher_core.compose.plate.plate import plate_cover, plate_picture
@@ -230,17 +230,17 @@ def test_the_shadow_in_the_photo_is_taken_along(editor: Editor) -> None:
     assert COMMANDS["take_shadow"].why_not(editor) == "Its shadow is being looked for"
     wait_for_jobs(editor)
     own = (shade > 0.3) & ~plate_cover(document)
-    offer = editor.composing.offer  # outlined, and nothing has changed
+    offer = editor.old_shadows.offer  # outlined, and nothing has changed
     assert offer is not None and editor.document is document
     assert (offer.outlined & own).sum() > 0.6 * own.sum()
     assert editor.message is not None and editor.message.action is not None
     editor.message.action.run()  # one click refuses
-    assert editor.document is document and editor.composing.offer is None
-    editor.composing._offer = offer
+    assert editor.document is document and editor.old_shadows.offer is None
+    editor.old_shadows._offer = offer
     editor.preview = edits.set_feather(document, 3.0)
-    assert editor.composing.offer is None, "what it was found in is not what one sees"
+    assert editor.old_shadows.offer is None, "what it was found in is not what one sees"
     editor.preview = None
-    editor.composing.accept_shadow()
+    editor.old_shadows.accept()
     assert editor.object is not None and editor.history is not None
     assert editor.history.undo_label == "Shadow as in the photo"
     assert editor.object.shadow.strength > 0.4
@@ -260,21 +260,21 @@ def test_a_shadow_that_would_stay_behind_is_offered_once_what_threw_it_is_moved(
     editor.start(edits.set_placement(document, 0, Placement()))
     editor.view.tool = ToolName.PLACE
     editor.apply("Move", edits.set_placement(editor.document, 0, moved))
-    wait_until(editor, lambda: editor.composing.offer is not None)
+    wait_until(editor, lambda: editor.old_shadows.offer is not None)
     assert editor.view.tool is ToolName.PLACE, "the artist is at work"
     assert editor.message is not None and editor.message.action is not None
     farther = replace(moved, move=(-80.0, 5.0))
     editor.apply("Move", edits.set_placement(editor.document, 0, farther))
-    assert editor.composing.offer is not None, "the object is only moved on"
+    assert editor.old_shadows.offer is not None, "the object is only moved on"
     before, action = editor.document, editor.message.action
     editor.message = None  # as the status bar does
     action.run()
     assert editor.object is not None and editor.object.shadow.strength > 0.4
-    assert editor.object.placement == farther and editor.composing.offer is None
+    assert editor.object.placement == farther and editor.old_shadows.offer is None
     editor.undo()
     assert editor.document is before
     wait_for_jobs(editor)
-    assert editor.composing.offer is None, "it is asked once"
+    assert editor.old_shadows.offer is None, "it is asked once"
 
 
 @pytest.mark.slow
@@ -285,7 +285,7 @@ def test_nothing_is_said_where_no_shadow_stays_behind(editor: Editor) -> None:
     editor.apply("Move", edits.set_placement(editor.document, 0, moved))
     wait_until(editor, lambda: editor.jobs.is_busy(SHADOW))
     wait_for_jobs(editor)
-    assert editor.message is None and editor.composing.offer is None
+    assert editor.message is None and editor.old_shadows.offer is None
 
 
 @pytest.mark.slow

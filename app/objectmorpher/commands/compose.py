@@ -5,7 +5,8 @@ from __future__ import annotations
 from objectmorpher_core import compose
 
 from ..editor.editor import Editor
-from ..editor.intents.composing import DEPTH, SHADOW, VARIANTS
+from ..editor.intents.composing import DEPTH, VARIANTS
+from ..editor.intents.old_shadows import SHADOW
 from ..editor.intents.refining import REFINE
 from ..editor.tasks import PLATE
 from ..editor.view import Composed, ToolName
@@ -159,7 +160,7 @@ COMMANDS: dict[str, Command] = {
         "Try 3 variants", "", lambda e: e.composing.try_variants(), _cannot_vary
     ),
     "take_shadow": Command(
-        "Shadow as in the photo", "", lambda e: e.composing.take_shadow(), _cannot_take
+        "Shadow as in the photo", "", lambda e: e.old_shadows.look(), _cannot_take
     ),
     "refine": Command("Refine", "", lambda e: e.refining.run(), _cannot_refine),
     "refine_again": Command(

@@ -33,6 +33,7 @@ from .intents.masking import Masking
 from .intents.methods import Methods
 from .intents.models import Models
 from .intents.objects import Objects, Pasting
+from .intents.old_shadows import OldShadows
 from .intents.painting import Painting
 from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
@@ -74,7 +75,8 @@ class Editor(EditorState):
         self.computing = Computing(self, self.tasks)
         self.methods = Methods(self, self.computing, self.tasks)
         self.models = Models(self, self.methods, self.shaping, self.tasks)
-        self.composing = Composing(self, self.methods, self.tasks, self.choose_tool)
+        self.composing = Composing(self, self.methods, self.tasks)
+        self.old_shadows = OldShadows(self, self.composing, self.choose_tool)
         self.hinting = Hinting(self, self.composing)
         self.painting = Painting(self)
         self.refining, self.exporting = RefiningIntents(self, self.methods), Exporting(self)
@@ -108,7 +110,7 @@ class Editor(EditorState):
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
             self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
-            self.leaving_out.poll, self.composing.watch,
+            self.leaving_out.poll, self.old_shadows.poll,
         )  # fmt: skip
 
     def _ask_elsewhere(self) -> None:
@@ -173,6 +175,7 @@ class Editor(EditorState):
         self.refits.forget()
         self.edging.forget()
         self.composing.forget()
+        self.old_shadows.forget()
         self.painting.forget()
         self.hinting.forget()
         self.refining.forget()
@@ -249,8 +252,8 @@ class Editor(EditorState):
             self.objects.carried = None
         elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
-        elif self.composing.offer is not None:
-            self.composing.refuse_shadow()
+        elif self.old_shadows.offer is not None:
+            self.old_shadows.refuse()
         else:
             if self.view.tool is ToolName.LOOK:
                 self.looking.reset()

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import TYPE_CHECKING
-from weakref import WeakSet
 
 import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.base.brush import Stroke
-from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
+from objectmorpher_core.document.model import Document, EditObject, Plate
 from objectmorpher_core.document.settings import Finish, Hint, Shadow
 
 from ...canvas.layer import CanvasLayer
@@ -25,7 +22,7 @@ from ...worker import job_functions
 from ...worker.job_functions import BackendChoice, Variant
 from ...worker.requests import JobError
 from ..tasks import PLATE
-from ..view import Action, ToolName, ViewState
+from ..view import ToolName, ViewState
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import PlatePatch
@@ -35,62 +32,11 @@ if TYPE_CHECKING:
     from .methods import Methods
 
 # Kinds of jobs, besides PLATE.
-VARIANTS, REPAIR, SHADOW, DEPTH = "variants", "repair", "shadow", "depth"
+VARIANTS, REPAIR, DEPTH = "variants", "repair", "depth"
 COUNT = 3  # variants
 USUAL_SHADOW = 0.55
 GRAIN = 2  # canvas px per px of the picture of a stroke
-SMOOTHED = np.ones((9, 9), np.uint8)  # px: the ground's own grain is no outline
-SPECK = 0.05  # x the largest piece's area, of one that is no piece of a shadow
-SEEN = 1 / 32  # of full scale, by which the ground becomes lighter where a shadow is outlined
 FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
-
-
-@dataclass(frozen=True, eq=False)
-class ShadowOffer:
-    """An object's shadow in the photo, which it could take along."""
-
-    document: Document  # in which they were looked for
-    k: int
-    shadow: Shadow
-    plate: Plate  # without it
-    action: Action | None = None  # which takes it along, where the artist did not ask
-
-    def stands(self, document: Document, current: int) -> bool:
-        """Whether it is of the current object of `document`, as that is now.
-
-        What the artist did not ask for may come while the object is moved on.
-        """
-        if self.action is None or document is self.document:
-            return document is self.document and self.k == current
-        if self.k != current or document.plate is not self.document.plate:
-            return False
-        own, was = document.objects[self.k], self.document.objects[self.k]
-        return own.matte is was.matte and own.shadow == was.shadow
-
-    @cached_property
-    def outlined(self) -> Mask:
-        """(H, W) of the photo what would be taken off it."""
-        photo, plate = self.document.photo, self.plate
-        if plate.painted is None:
-            return np.zeros(photo.size[::-1], bool)
-        x0, y0, x1, y1 = plate.box
-        change = cv2.absdiff(plate.pixels, photo.pixels[y0:y1, x0:x1]).max(-1)
-        is_seen = plate.painted & (change > SEEN * np.iinfo(change.dtype).max)
-        whole = crop(is_seen, plate.box, (0, 0, *photo.size)).astype(np.uint8)
-        closed = cv2.morphologyEx(whole, cv2.MORPH_CLOSE, SMOOTHED)
-        opened = cv2.morphologyEx(closed, cv2.MORPH_OPEN, SMOOTHED)
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(opened)
-        area = np.asarray(stats)[:, cv2.CC_STAT_AREA]
-        area[0] = 0
-        return (area > SPECK * area.max())[np.asarray(labels)]
-
-
-def _offer_of(document: Document, k: int, answer: tuple[Shadow, Plate]) -> ShadowOffer:
-    shadow, plate = answer
-    ground = document.objects[k].shadow.ground
-    if ground is not None or document.horizon is not None:  # it was known how one looks at it
-        shadow = replace(shadow, ground=ground)
-    return ShadowOffer(document, k, shadow, plate)
 
 
 class Composing:
@@ -101,26 +47,21 @@ class Composing:
         editor: EditorState,
         methods: Methods,
         tasks: Tasks,
-        choose_tool: Callable[[ToolName], None],
     ) -> None:
         self._editor = editor
-        self._methods, self._tasks, self._choose_tool = methods, tasks, choose_tool
+        self._methods, self._tasks = methods, tasks
         self._variants: tuple[tuple[Mask | None, ...], tuple[Variant, ...]] = ((), ())
         self._answers = Answers(editor)
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
         self._compared: tuple[Plate, Document] | None = None  # a variant that is looked at
-        self._offer: ShadowOffer | None = None  # found in the photo, not taken along yet
-        self._watched: tuple[Document | None, int] = (None, 0)  # looked at last
-        self._looked_for: WeakSet[Matte] = WeakSet()  # whose shadows were looked for unasked
 
     def forget(self) -> None:
         """Another document is opened."""
         self._variants = (), ()
         self._answers.forget()
-        self._stroke, self._waiting, self._offer, self._compared = None, [], None, None
-        self._watched = None, 0
+        self._stroke, self._waiting, self._compared = None, [], None
 
     def deliver(self) -> bool:
         """Takes in what the worker has made, between strokes; once a frame."""
@@ -177,7 +118,7 @@ class Composing:
     ) -> None:
         editor, document = self._editor, self._editor.document
         assert document is not None
-        masks = _masks(document)
+        masks = masks_of(document)
 
         def take(plate: Plate) -> None:
             end()
@@ -201,14 +142,14 @@ class Composing:
         editor, document = self._editor, self._editor.document
         if document is None or document.plate is None:
             return
-        masks = _masks(document)
+        masks = masks_of(document)
 
         def accept(variants: tuple[Variant, ...]) -> None:
             self._variants = (masks, variants)
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.fill_variants, document.photo.pixels,
-            editor.derived.hidden(document), self._choice(document.plate.seed + 1), COUNT,
+            editor.derived.hidden(document), self.choice(document.plate.seed + 1), COUNT,
             done=accept, failed=editor.complain_of, kind=VARIANTS,
         )  # fmt: skip
 
@@ -217,7 +158,7 @@ class Composing:
         """The backgrounds to choose from, as long as the masks are the same."""
         document = self._editor.document
         masks, variants = self._variants
-        return variants if document is not None and same(masks, _masks(document)) else ()
+        return variants if document is not None and same(masks, masks_of(document)) else ()
 
     def compare_variant(self, k: int | None) -> None:
         """Show the edit on the variant at `k`, or, for None, on its own background again."""
@@ -238,7 +179,7 @@ class Composing:
         self.compare_variant(None)
         document = self._editor.committed
         if document is not None and document.plate is not variant.plate:
-            masks, hints = _masks(document), document.hints
+            masks, hints = masks_of(document), document.hints
             self._take_plate(masks, variant.plate, t("Choose background"), hints)
 
     def _take_plate(
@@ -246,10 +187,11 @@ class Composing:
     ) -> None:
         editor = self._editor
         document = editor.committed
-        if document is not None and same(masks, _masks(document)):
+        if document is not None and same(masks, masks_of(document)):
             editor.apply(label, edits.set_plate(edits.set_hints(document, hints), plate))
 
-    def _choice(self, seed: int) -> BackendChoice:
+    def choice(self, seed: int) -> BackendChoice:
+        """Who fills in the background, and how."""
         document = self._editor.document
         return BackendChoice(self.inpainter, seed, () if document is None else document.hints)
 
@@ -321,7 +263,7 @@ class Composing:
 
         editor.jobs.start(
             t("Repairing the background"), job_functions.repair, patch, margin_of(document),
-            self._choice(asked.seed + 1), done=accept, failed=fail, cancelled=drop, kind=REPAIR,
+            self.choice(asked.seed + 1), done=accept, failed=fail, cancelled=drop, kind=REPAIR,
         )  # fmt: skip
 
     def _take_repair(self, asked: Plate, patch: PlatePatch, backend: str) -> None:
@@ -373,7 +315,7 @@ class Composing:
         """Return the angle, degrees above the ground, at which the camera sees the object."""
         editor = self._editor
         assert editor.document is not None
-        return _seen_from(editor.document, editor.current, shadow)
+        return seen_from(editor.document, editor.current, shadow)
 
     def toggle_shadow(self) -> None:
         """Gives the current object a shadow, or takes it."""
@@ -403,135 +345,6 @@ class Composing:
             t("Looking how deep the photo is"), job_functions.look_at_depth,
             document.photo.pixels, done=accept, failed=editor.complain_of, kind=DEPTH,
         )  # fmt: skip
-
-    def take_shadow(self) -> None:
-        """Looks for its shadow in the photo, and outlines what it finds.
-
-        Nothing changes before `accept_shadow`; `refuse_shadow`, or any other edit, ends the offer.
-        """
-        editor = self._editor
-        if (asked := self._cutout()) is None:
-            return
-        document, k, cutout = asked
-        masks = _masks(document)
-
-        def accept(answer: tuple[Shadow, Plate] | None) -> None:
-            if answer is None:
-                about = t("No clear shadow was found in the photo")
-                editor.say(about + " · " + t("Strength adds one, B paints an old one out"))
-                return
-            offer = _offer_of(document, k, answer)
-            self._answers.add(lambda: self._show_offer(masks, offer))
-
-        assert document.plate is not None
-        editor.jobs.start(
-            t("Looking for its shadow"), job_functions.take_shadow, cutout,
-            self._choice(document.plate.seed + 1), done=accept, failed=editor.complain_of,
-            kind=SHADOW,
-        )  # fmt: skip
-
-    def _cutout(self) -> tuple[Document, int, job_functions.Cutout] | None:
-        """The current object, and what there is to be known of its ground."""
-        editor, document, k = self._editor, self._editor.committed, self._editor.current
-        if document is None or document.plate is None or not editor.is_lifted:
-            return None
-        item = document.objects[k]
-        assert item.matte is not None
-        is_known = item.shadow.ground is not None or document.horizon is not None
-        ground = _seen_from(document, k, item.shadow) if is_known else None
-        covered = editor.derived.hidden(document)
-        return document, k, job_functions.Cutout(document.photo.pixels, item.matte, covered, ground)
-
-    def watch(self) -> bool:
-        """Looks once whether an object that was moved leaves a shadow behind; once a frame.
-
-        It is offered where it is sure; nothing is said where none is.
-        """
-        editor, document = self._editor, self._editor.committed
-        if editor.hand.is_busy or editor.preview is not None or not editor.jobs.is_idle:
-            return False
-        if document is None or editor.is_saved:
-            return False
-        before, self._watched = self._watched, (document, editor.current)
-        if before[0] is document and before[1] == editor.current:
-            return False
-        if (asked := self._cutout()) is None or not self._may_leave_one(document.objects[asked[1]]):
-            return False
-        document, k, cutout = asked
-        assert document.plate is not None
-        self._looked_for.add(cutout.matte)
-
-        def accept(answer: tuple[Shadow, Plate] | None) -> None:
-            if answer is not None:
-                action = Action(t("Take it along"), self.accept_shadow)
-                offer = replace(_offer_of(document, k, answer), action=action)
-                self._answers.add(lambda: self._suggest(offer))
-
-        def look_again() -> None:
-            self._looked_for.discard(cutout.matte)
-            self._watched = None, 0
-
-        editor.jobs.start(
-            t("Looking for its shadow"), job_functions.take_shadow, replace(cutout, is_asked=False),
-            self._choice(document.plate.seed + 1), done=accept, failed=lambda error: None,
-            cancelled=look_again, replaced=look_again, kind=SHADOW, is_quiet=True, is_spare=True,
-        )  # fmt: skip
-        return True
-
-    def _may_leave_one(self, item: EditObject) -> bool:
-        from objectmorpher_core.scripting.runner import has_left
-
-        document = self._editor.committed
-        if document is None or item.is_visitor or not item.is_visible or item.shadow.strength > 0:
-            return False
-        return item.matte not in self._looked_for and has_left(item, document)
-
-    def _suggest(self, offer: ShadowOffer) -> None:
-        """Offers what was found unasked, where nothing else is offered."""
-        editor = self._editor
-        document, said = editor.committed, editor.message
-        if document is None or not offer.stands(document, editor.current):
-            return
-        if said is not None and (said.is_error or said.action is not None):
-            return
-        self._offer = offer
-        editor.say(t("What is outlined is its shadow, and stays behind"), offer.action)
-
-    def _show_offer(self, masks: tuple[Mask | None, ...], offer: ShadowOffer) -> None:
-        editor, document = self._editor, self._editor.committed
-        if document is None or not same(masks, _masks(document)):
-            return
-        self._offer = replace(offer, document=document)
-        self._choose_tool(ToolName.COMPOSE)  # which outlines it
-        text = t("What is outlined is its shadow, and would go along")
-        editor.say(text, Action(t("Leave it in the photo"), self.refuse_shadow))
-
-    def accept_shadow(self) -> None:
-        """What was outlined goes along; one step for undo."""
-        offer, self._offer, document = self._offer, None, self._editor.document
-        if offer is None or document is None or not offer.stands(document, self._editor.current):
-            return
-        changed = edits.set_plate(document, offer.plate)
-        changed = edits.set_shadow(changed, offer.k, offer.shadow)
-        self._editor.apply(t("Shadow as in the photo"), changed)
-        self._editor.message = None
-
-    def refuse_shadow(self) -> None:
-        """What was outlined stays in the photo."""
-        self._offer = None
-        self._editor.message = None
-
-    @property
-    def offer(self) -> ShadowOffer | None:
-        """What would be taken along, as long as the document is the one in which it was found."""
-        offer, editor = self._offer, self._editor
-        if offer is None or editor.document is None:
-            return None
-        if offer.action is not None:  # it lasts as long as the question
-            message = editor.message
-            if message is None or message.action is not offer.action:
-                return None
-        return offer if offer.stands(editor.document, editor.current) else None
 
     def choose_refiner(self, name: str) -> None:
         """Choose one of `compose.REFINERS`."""
@@ -611,11 +424,12 @@ def _nothing() -> None:
     """Nobody waits for the background."""
 
 
-def _masks(document: Document) -> tuple[Mask | None, ...]:
+def masks_of(document: Document) -> tuple[Mask | None, ...]:
+    """The masks (H, W) of a document's objects: what was computed of others is out of date."""
     return tuple(o.mask for o in document.objects)
 
 
-def _seen_from(document: Document, k: int, shadow: Shadow) -> float:
+def seen_from(document: Document, k: int, shadow: Shadow) -> float:
     """From how many degrees above the ground one looks at object `k` on it."""
     from objectmorpher_core.compose.light.lighting import ground_seen_from
 

@@ -47,7 +47,7 @@ def draw_compose(canvas: CanvasPainter) -> None:
 def draw_offered_shadow(canvas: CanvasPainter) -> None:
     """Outline what would be taken along of a shadow in the photo."""
     editor = canvas.editor
-    if (offer := editor.composing.offer) is not None:
+    if (offer := editor.old_shadows.offer) is not None:
         for outline in editor.derived.contours(offer.outlined):
             canvas.dashes(canvas.at(outline))
 

@@ -172,7 +172,7 @@ def _draw_shadow(editor: Editor) -> None:
         note(f"{reason}.")
         return
     assert editor.object is not None
-    if editor.composing.offer is None:
+    if editor.old_shadows.offer is None:
         command_button(editor, "take_shadow", width=-1)
     else:
         _draw_offer(editor)
@@ -212,9 +212,9 @@ def _draw_offer(editor: Editor) -> None:
     """What is outlined on the photo goes along, or stays."""
     note(t("The photo shows outlined what would go along."))
     if button(t("Take it along"), Emphasis.PRIMARY_SMALL, width=-1):
-        editor.composing.accept_shadow()
+        editor.old_shadows.accept()
     if button(t("Leave it in the photo"), width=-1):
-        editor.composing.refuse_shadow()
+        editor.old_shadows.refuse()
 
 
 def _draw_direction(editor: Editor) -> None:
