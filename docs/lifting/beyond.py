@@ -66,9 +66,9 @@ def compared(pixels: RGB, inside: Mask) -> tuple[Filled, Filled] | None:
     alpha = crop(mirrored.alpha, mirrored.box, (0, 0, width, height))
     own = inside & (alpha > 0.5)
     own[:, :cut] = False
-    if min(np.ptp(np.flatnonzero(own.any(0)), initial=0), own.sum() ** 0.5) < LEAST:
-        return None
     rows, columns = np.nonzero(own)
+    if len(rows) < LEAST**2 or np.ptp(columns) < LEAST:
+        return None
     side = min(max(np.ptp(rows), np.ptp(columns), TILE // 2) + 1, height, width)
     top = int(np.clip(rows.mean() - side / 2, 0, height - side))
     left = int(np.clip(columns.mean() - side / 2, 0, width - side))

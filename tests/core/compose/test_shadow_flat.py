@@ -17,6 +17,7 @@ from objectmorpher_core.compose.shadow.shadow import FINE, LAST_BLURS, FlatShado
 from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 from objectmorpher_core.document.model import Matte
 from objectmorpher_core.pictures.image import read_picture
+from objectmorpher_core.segment.matting.soft_edge import signed_distance
 
 BOWL = Path(__file__).parents[3] / "assets" / "samples" / "bowl.jpg"
 WIDTH, HEIGHT = 300, 240
@@ -66,18 +67,16 @@ def _in_the_sun(ground: np.ndarray) -> np.ndarray:
     shade = cv2.GaussianBlur(_disc(LEFT, TOP).astype(np.float32), (0, 0), BLUR)
     shade[_disc()] = 0
     seen = lit * (1 - shade + shade * DARK)[..., None] ** (1 / 2.2)
-    coarse = cv2.imencode(".jpg", seen.astype(np.uint8)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])[
-        1
-    ]
+    quality = [cv2.IMWRITE_JPEG_QUALITY, 80]
+    _, coarse = cv2.imencode(".jpg", seen.astype(np.uint8)[..., ::-1], quality)
     return np.ascontiguousarray(cv2.imdecode(coarse, cv2.IMREAD_COLOR)[..., ::-1])
 
 
 def test_the_new_shadow_is_as_far_beside_the_outline_and_as_hard(ground, matte):
     old = find_old_shadow(_in_the_sun(ground), matte)
     assert old is not None
-    blur = (
-        old.shadow.softness * (LAST_BLURS[1] - LAST_BLURS[0]) * np.ptp(np.argwhere(_disc())[:, 0])
-    )
+    side = np.ptp(np.argwhere(_disc())[:, 0])
+    blur = old.shadow.softness * (LAST_BLURS[1] - LAST_BLURS[0]) * side
     assert blur == pytest.approx(BLUR, abs=0.4)
     camera = Camera.from_fov(WIDTH, HEIGHT, 50.0)
     inside = np.argwhere(_disc())[:, ::-1] + 0.5
@@ -160,11 +159,7 @@ def test_no_line_stays_where_the_bowls_shadow_ended():
     opened = cv2.morphologyEx(closed, cv2.MORPH_OPEN, kernel)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(opened)
     shade = labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    inner, outer = (
-        cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (shade, ~shade)
-    )
-    free = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5) > 14
-    away = np.where(shade, 0.5 - inner, outer - 0.5)
+    away, free = -signed_distance(shade), signed_distance(covered) < -13.5
     fine = shown - cv2.GaussianBlur(shown, (0, 0), 8)
     for px in range(-5, 5):
         assert abs(fine[free & (away > px) & (away <= px + 1)].mean()) < 4, f"{px} px from it"
