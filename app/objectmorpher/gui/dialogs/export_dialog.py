@@ -161,10 +161,7 @@ def _draw_where(editor: Editor) -> bool:
 
 
 def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
-    """What is wrong, or what will be replaced; Cancel and the button that does it.
-
-    `is_unfolded`: a list was when the frame began, and Esc is for it.
-    """
+    """What is wrong, or what will be replaced; Cancel and the button that does it."""
     problem = exporting.problem
     imgui.dummy(theme.size(0, 4))
     warning = t("{name} is there already.", name=exporting.path.name)
