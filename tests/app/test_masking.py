@@ -418,6 +418,20 @@ def test_a_box_is_new_added_or_taken_away(editor: Editor) -> None:
     assert not editor.mask[20, 20] and editor.mask[int(CENTRE[1]), int(CENTRE[0])]
 
 
+@pytest.mark.parametrize("mode", [SelectMode.BOX, SelectMode.LASSO])
+def test_clicks_begin_and_correct_whatever_is_dragged(editor: Editor, mode: SelectMode) -> None:
+    editor.view.selecting.mode = mode
+    ball = editor.view.canvas_from_image(np.array(CENTRE))
+    stroke(editor, SelectTool(), ball)
+    wait_for_jobs(editor)
+    assert editor.mask is not None and editor.mask[round(CENTRE[1]), round(CENTRE[0])]
+    wall = editor.view.canvas_from_image(np.array(FAR))
+    stroke(editor, SelectTool(), wall, alt=True)
+    wait_for_jobs(editor)
+    added, removed = editor.selection.prompt.clicks
+    assert added.is_foreground and not removed.is_foreground
+
+
 def test_a_mask_goes_out_to_a_picture_and_comes_back(editor: Editor, tmp_path: Path) -> None:
     select_ball(editor)
     editor.view.selecting.reach = 5.0
