@@ -213,6 +213,8 @@ def _choice(name: str, choices: Sequence[tuple[T, str, str | None]], chosen: T) 
             flags = imgui.SelectableFlags_.disabled if reason else imgui.SelectableFlags_.none
             if imgui.selectable(shown, value is chosen, flags)[0]:
                 found = value
+            if value is chosen:
+                imgui.set_item_default_focus()  # the arrows go on from it
             mark(shown)
             if reason:
                 tooltip(reason)
