@@ -24,7 +24,7 @@ from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
 from objectmorpher_core.document.model import Document, EditObject, Matte, Photo, Placement
 from objectmorpher_core.pictures.image import Picture
-from objectmorpher_core.session.journal import DOCUMENT, read_journal
+from objectmorpher_core.session.journal import DOCUMENT, read_about, read_journal
 from tests.tree import PYTHONPATH
 
 INTERVAL = 0.5  # s, for tests that need not wait for the editor's own
@@ -80,9 +80,15 @@ def test_what_is_unsaved_is_kept_until_it_is_saved(editor: Editor, root: Path) -
     settle(editor)
     (folder,) = folders(root)
     assert_is_step(read_journal(folder), 3)
+    assert read_about(folder)["name"] == editor.committed.photo.name
+    editor.tab.path = root / "of the walk.omorph"
     editor.history.mark_saved(editor.committed)
     settle(editor)
     assert folders(root) == []
+    editor.apply("Step", step_document(editor.committed, 4))
+    settle(editor)
+    (folder,) = folders(root)
+    assert read_about(folder)["name"] == "of the walk.omorph"
 
 
 def test_undoing_everything_leaves_nothing_to_keep(editor: Editor, root: Path) -> None:

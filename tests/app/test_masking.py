@@ -15,7 +15,7 @@ from editor_steps import CENTRE, HEIGHT, WIDTH, wait_for_jobs, wait_until
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
-from objectmorpher.editor.tasks import Combine, Question
+from objectmorpher.editor.tasks import READY, Combine, Question
 from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.tools.brush_tools import MaskTool
@@ -191,6 +191,41 @@ def test_the_edge_of_a_moved_object_is_repaired_where_it_is_seen(
     editor.escape()
     wait_for_jobs(editor)
     assert editor.committed is before
+
+
+def test_the_shape_follows_an_edge_that_is_hardened_again_after_undo(
+    editor: Editor, ball: Document
+) -> None:
+    """The mask stays the same array; what is soft of it does not."""
+    _moved_ball(editor, ball, 50.0, -6.0)
+    editor.view.selecting.reach = 3.0
+    run(editor, "feather")
+    wait_until(editor, lambda: editor.object.coverage is not None and editor.object.shaped is None)
+    soft = editor.object
+    run(editor, "harden")
+    wait_until(editor, lambda: editor.object.shaped is None)
+    hard = editor.object
+    assert hard.mask is soft.mask and hard.coverage is None
+    run(editor, "undo")
+    assert editor.object is soft
+    run(editor, "harden")
+    wait_until(editor, lambda: editor.object.shaped is None)
+    np.testing.assert_array_equal(editor.object.matte.alpha, hard.matte.alpha)
+    assert editor.object.matte.alpha.size < soft.matte.alpha.size  # nothing is soft beyond the edge
+
+
+def test_the_shape_follows_a_step_that_was_undone_while_it_was_made_ready(
+    editor: Editor, ball: Document
+) -> None:
+    _moved_ball(editor, ball, 50.0, -6.0)
+    run(editor, "grow")
+    wait_until(editor, lambda: editor.chores.is_busy(f"{READY} 0"))
+    assert editor.object.shaped is not None
+    run(editor, "undo")
+    wait_for_jobs(editor)
+    run(editor, "redo")
+    wait_until(editor, lambda: editor.object.shaped is None)
+    assert editor.history.undo_label == "Grow selection"
 
 
 def test_the_backgrounds_colour_goes_out_of_the_edge_and_comes_back(
@@ -381,6 +416,20 @@ def test_a_box_is_new_added_or_taken_away(editor: Editor) -> None:
     editor.selection.set_box(box)
     wait_for_jobs(editor)
     assert not editor.mask[20, 20] and editor.mask[int(CENTRE[1]), int(CENTRE[0])]
+
+
+@pytest.mark.parametrize("mode", [SelectMode.BOX, SelectMode.LASSO])
+def test_clicks_begin_and_correct_whatever_is_dragged(editor: Editor, mode: SelectMode) -> None:
+    editor.view.selecting.mode = mode
+    ball = editor.view.canvas_from_image(np.array(CENTRE))
+    stroke(editor, SelectTool(), ball)
+    wait_for_jobs(editor)
+    assert editor.mask is not None and editor.mask[round(CENTRE[1]), round(CENTRE[0])]
+    wall = editor.view.canvas_from_image(np.array(FAR))
+    stroke(editor, SelectTool(), wall, alt=True)
+    wait_for_jobs(editor)
+    added, removed = editor.selection.prompt.clicks
+    assert added.is_foreground and not removed.is_foreground
 
 
 def test_a_mask_goes_out_to_a_picture_and_comes_back(editor: Editor, tmp_path: Path) -> None:

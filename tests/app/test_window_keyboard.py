@@ -12,6 +12,8 @@ from PIL import Image
 from editor_steps import CENTRE, WIDTH
 from hands import Hands, opened
 from keyboard import Keys
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.session.file import save_session
 from test_window import POSE_TOOL, PRIMARY
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
@@ -107,3 +109,23 @@ def test_the_whole_job_by_keyboard_alone(hands: Hands, photo_path: Path, tmp_pat
     hands.wait(exported.exists, "exporting")
     changed = np.asarray(Image.open(exported)) != np.asarray(Image.open(photo_path))
     assert changed.any()
+
+
+def test_a_list_that_is_unfolded_begins_at_what_is_chosen(
+    window_environment: dict[str, str], ball: Document, tmp_path: Path
+) -> None:
+    save_session(ball, tmp_path / "ball.omorph")
+    with opened(window_environment, tmp_path / "ball.omorph") as hands:
+        keys = Keys(hands)
+        keys.wait("Photo")
+        keys.press("ctrl+e")
+        keys.wait("Focus: Name")
+        keys.reach("Photo")
+        for name in ("Object cut-out", "Mask", "Depth"):
+            keys.press("space")
+            keys.wait("3D object")
+            keys.press("Down")
+            keys.wait(f"Focus: {name}")
+            keys.press("Return")
+            hands.wait(lambda: "3D object" not in hands.places(), "folding the list up")
+            keys.wait(f"Focus: {name}")

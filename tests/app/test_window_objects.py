@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from editor_steps import CENTRE, HEIGHT, WIDTH
 from hands import ACCENT, Hands, opened
 from objectmorpher.editor.editor import Editor
-from objectmorpher_core.document import edits
+from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session, save_session
 
@@ -79,3 +80,23 @@ def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
     first, second = decode_session(session.read_bytes()).objects
     assert first.placement.move[0] < -5, "the one under the pointer was moved"
     assert second.placement.move == (50.0, 0.0)
+
+
+def test_a_locked_object_has_no_frame_to_take_hold_of(
+    window_environment: dict[str, str], ball: Document, tmp_path: Path
+) -> None:
+    """Neither is there a hint how to change it; one that is free can be taken from beside it."""
+    session, size = tmp_path / "balls.omorph", (WIDTH, HEIGHT)
+    two = edits.set_placement(edits.duplicate(ball, 0), 1, Placement(move=(50.0, 0.0)))
+    save_session(hold_edits.set_locked(two, 1, True), session)
+    with opened(window_environment, session) as hands:
+        hands.choose("row of Object 2")
+        hands.press("4")
+        hands.area("Object 2 is locked")
+        place = hands.on_photo(CENTRE[0] + 50.0, CENTRE[1], size)
+        hands.xdotool("mousemove", *(round(v) for v in place))
+        hands.nudge()
+        assert "Object 2 is locked" in hands.places() and "Ring: yaw" not in hands.places()
+        hands.drag(hands.on_photo(*FIRST, size), hands.on_photo(*TO, size))
+        hands.area("Ring: yaw")  # of the other one
+        assert "Object 2 is locked" not in hands.places()

@@ -92,7 +92,7 @@ def recovery_root() -> Path:
 class About:
     """A journal's summary of its document."""
 
-    name: str  # of the photo
+    name: str  # of the session, or of the photo where it was never saved
     edited: str  # local time, ISO 8601
     objects: int
     path: str | None  # of the session, where it was saved once
@@ -178,7 +178,7 @@ class Autosave:
     def _about(self, document: Document) -> About:
         path, source = self._tab.path, self._tab.source
         return About(
-            document.photo.name, datetime.now().isoformat(timespec="seconds"),
+            self._tab.name, datetime.now().isoformat(timespec="seconds"),
             sum(thing.mask is not None for thing in document.objects),
             str(path) if path else None, str(source) if source else None,
         )  # fmt: skip

@@ -36,7 +36,7 @@ class Left:
     """Unsaved work of an editor that crashed."""
 
     folder: Path
-    name: str = ""  # of the photo
+    name: str = ""  # as its tab's
     edited: datetime | None = None
     objects: int = 0
     path: Path | None = None  # of the session

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.arrays import Mask, Selection
 from objectmorpher_core.document import edge_edits, edits
 from objectmorpher_core.document.model import Document, LiftedObject, Plate
 from objectmorpher_core.segment.mask_edit import as_coverage
@@ -38,7 +38,7 @@ class RefitRequest:
     """The request behind an answer, which is dropped when the request has changed since."""
 
     k: int
-    mask: Mask
+    outline: Selection
     lifted: LiftedObject
     plate: Plate | None
 
@@ -46,7 +46,7 @@ class RefitRequest:
         if self.k >= len(document.objects) or document.plate is not self.plate:
             return False
         item = document.objects[self.k]
-        return item.mask is self.mask and item.lifted is self.lifted
+        return item.selection is self.outline and item.lifted is self.lifted
 
 
 class Refits:
@@ -92,10 +92,10 @@ class Refits:
         from objectmorpher_core.lift.registration.imported import ImportTarget
 
         editor, item, photo = self._editor, document.objects[k], document.photo
-        assert item.mask is not None and item.lifted is not None
-        matte, outline = item.found_matte, item.selection
-        assert item.shaped is not None and matte is not None and outline is not None
-        wanted = RefitRequest(k, item.mask, item.lifted, document.plate)
+        matte, outline, lifted = item.found_matte, item.selection, item.lifted
+        assert item.shaped is not None and matte is not None
+        assert outline is not None and lifted is not None
+        wanted = RefitRequest(k, outline, lifted, document.plate)
         self._asked, self._answer = wanted, None
 
         def accept(answer: Refitted) -> None:
@@ -107,7 +107,7 @@ class Refits:
 
         editor.jobs.start(
             t("Fitting {name} to its new outline", name=item.name), job_functions.refit,
-            Lifted(item.shaped, matte, item.lifted, item.shape),
+            Lifted(item.shaped, matte, lifted, item.shape),
             ImportTarget(photo.pixels, photo.camera, outline, mixed=item.mixed),
             background_of(document, k, editor.settings.backends.inpaint), document.seed,
             done=accept, failed=fail, kind=REFIT,
@@ -118,8 +118,13 @@ class Refits:
         editor, k = self._editor, wanted.k
         self._answer = None
 
+        def keep() -> None:
+            if self._asked is wanted:
+                self._answer = answer
+
         def change(document: Document) -> Document | None:
             if not wanted.is_of(document):
+                keep()  # it was undone, and may be done again
                 return None
             fitted = edits.refit(document, k, answer.matte, answer.lifted, answer.plate)
             if document.refined is None:
@@ -129,9 +134,10 @@ class Refits:
 
         def show(changed: Document) -> None:
             if editor.hand.is_busy or editor.preview is not None:
-                self._answer = answer  # once more, when the hand is idle
+                keep()  # once more, when the hand is idle
                 return
             assert editor.history is not None and editor.committed is not None
+            self._asked = None  # a later step may ask for the same
             changed = _held(editor, changed, k)
             lost = len(editor.committed.objects[k].handles) - len(changed.objects[k].handles)
             editor.history.amend(changed)

@@ -31,7 +31,7 @@ def _is_on_visitor(editor: Editor, pointer: Pointer) -> bool:
 
 
 class SelectTool:
-    """Left click adds, right click removes, drag draws a box or, in Lasso mode, a line."""
+    """Left click adds, right or Alt removes, drag draws a box or, in Lasso mode, a line."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         if _is_on_visitor(editor, pointer):
@@ -48,7 +48,7 @@ class SelectTool:
         end = yield from draw_box(editor, start)
         if end is not None:
             self._choose_box(editor, start, end)
-        elif editor.view.selecting.mode is SelectMode.CLICK:
+        else:
             self._click(editor, start, is_foreground=not start.alt)
 
     def _remove_click(self, editor: Editor, start: Pointer) -> Stroke:
@@ -85,6 +85,9 @@ class SelectTool:
                     path.append(pointer.xy)
         finally:
             editor.selection.path = None
+        if len(path) == 1:
+            self._click(editor, start, is_foreground=not start.alt)
+            return
         outline = editor.view.image_from_canvas(np.array(path))
         if np.ptp(outline, axis=0).min() >= MIN_BOX:
             editor.selection.set_outline(outline, _combine(start))

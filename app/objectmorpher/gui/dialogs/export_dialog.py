@@ -161,10 +161,7 @@ def _draw_where(editor: Editor) -> bool:
 
 
 def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
-    """What is wrong, or what will be replaced; Cancel and the button that does it.
-
-    `is_unfolded`: a list was when the frame began, and Esc is for it.
-    """
+    """What is wrong, or what will be replaced; Cancel and the button that does it."""
     problem = exporting.problem
     imgui.dummy(theme.size(0, 4))
     warning = t("{name} is there already.", name=exporting.path.name)
@@ -216,6 +213,8 @@ def _choice(name: str, choices: Sequence[tuple[T, str, str | None]], chosen: T) 
             flags = imgui.SelectableFlags_.disabled if reason else imgui.SelectableFlags_.none
             if imgui.selectable(shown, value is chosen, flags)[0]:
                 found = value
+            if value is chosen:
+                imgui.set_item_default_focus()  # the arrows go on from it
             mark(shown)
             if reason:
                 tooltip(reason)

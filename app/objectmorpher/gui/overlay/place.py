@@ -29,13 +29,15 @@ TRUST = {"fine": "#70A020", "look closely": "#E0A030", "guesswork": "#E05040"}
 
 
 def draw_frame(canvas: CanvasPainter) -> None:
-    """Draw the Place tool's frame."""
+    """Draw the Place tool's frame; a locked object has none."""
     editor = canvas.editor
     shown = gizmo(editor)
-    if shown is None:
+    if shown is None or editor.object is None:
         return
     part = editor.hover.part
     draw_other(canvas)
+    if editor.object.is_locked:
+        return
     draw_offered_shadow(canvas)
     for line in ghost(editor):
         canvas.dashes(canvas.at(line), WHITE)

@@ -42,6 +42,8 @@ def draw_method(editor: Editor, stage: str) -> None:
         label = _label(editor, stage, method.name)
         if imgui.selectable(label, method.name == chosen, flags)[0]:
             editor.methods.choose(stage, method.name)
+        if method.name == chosen:
+            imgui.set_item_default_focus()  # the arrows go on from it
         mark(f"{stage}: {method.name}")
         if method.why_not is not None:
             tooltip(sentence(method.why_not))

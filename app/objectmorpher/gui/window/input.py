@@ -272,6 +272,9 @@ class Input:
     def hint(self, editor: Editor) -> str:
         if editor.document is None:
             return t("Open a photo, drop one here, or try a sample")
+        own = editor.object
+        if own is not None and _is_held(editor) and editor.hover.other is None:
+            return t("{name} is locked", name=own.name)
         return TOOLS[editor.view.tool].hint(editor)
 
     def take_key(self, keys: str) -> None:
@@ -412,7 +415,7 @@ class Input:
         if self._hovered is None or any(
             a is not b and a != b for a, b in zip(key, self._hovered, strict=True)
         ):
-            self.shape = tool.hover(editor, pointer)
+            self.shape = _hover(tool, editor, pointer)
             self._hovered = key
 
     def _go_on(self, editor: Editor, pointer: Pointer) -> None:
@@ -439,13 +442,25 @@ class Input:
 
 def _is_locked(editor: Editor, pointer: Pointer) -> bool:
     """Whether a press would change the current object, which is locked; that is said."""
-    own, tool = editor.object, editor.view.tool
-    if own is None or not own.is_locked or tool not in CHANGING or tool is ToolName.SELECT:
-        return False
-    if editor.objects.other_at(pointer.xy) is not None:
+    if not _is_held(editor) or editor.objects.other_at(pointer.xy) is not None:
         return False
     editor.say_locked(editor.current)
     return True
+
+
+def _is_held(editor: Editor) -> bool:
+    """Whether the tool would change the current object, which is locked."""
+    own, tool = editor.object, editor.view.tool
+    is_changing = tool in CHANGING and tool is not ToolName.SELECT
+    return own is not None and own.is_locked and is_changing
+
+
+def _hover(tool: Tool, editor: Editor, pointer: Pointer) -> PointerShape:
+    """What a press would take is marked: of a locked object nothing, of the others all."""
+    if _is_held(editor) and editor.objects.other_at(pointer.xy) is None:
+        editor.hover = Hover()
+        return PointerShape.ARROW
+    return tool.hover(editor, pointer)
 
 
 def _is_answered(editor: Editor) -> bool:
