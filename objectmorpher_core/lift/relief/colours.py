@@ -15,6 +15,7 @@ import numpy as np
 from ...base.arrays import F32, F64, Mask, frozen
 from ...base.kernel_files import numba
 from .canvas import ReliefCanvas, bilinear
+from .fringe import inwardness
 from .mirror import MirrorAxis
 from .silhouette import ReliefSilhouette
 
@@ -24,6 +25,7 @@ RIM_BLUR = 0.5  # x mean spacing, of the rim's texture
 RIM = (0.08, 0.28)  # x local radius from the outline: where the rim's own texture ends
 BACK_SIDE = 200  # px, longer side of the picture in which the rim's texture is grown
 HIDDEN_SIDE = 400  # px, likewise for what was hidden
+EVEN = 0.04  # x the root of the area, over which what replaces a fringe is evened
 SURE = 0.95  # alpha from which a pixel is the object's
 
 
@@ -58,6 +60,7 @@ def colouring(
     xy = (cells + 0.5) * step + corner
     depth = _depth(silhouette, xy)
     front = _continued(_resized(canvas.foreground, size), shown, depth, xy, axis)
+    front = _without_fringe(front, _resized(inwardness(canvas.whole), size))
     spacing = spacing / float(step.mean())
     blurred = _blurred(front, BLUR * spacing)
     if is_mirrored:
@@ -67,6 +70,20 @@ def colouring(
     t = np.clip((depth - RIM[0]) / (RIM[1] - RIM[0]), 0, 1)[..., None]
     back = blurred + (t * t * (3 - 2 * t)) * (rim - blurred)
     return Colouring(corner, step, blurred, back.astype(np.float32))
+
+
+def _without_fringe(front: F32, inward: F32) -> F32:
+    """`front` (h, w, 3), its fringe, where `inward` (h, w) is below 1, as what is farther in."""
+    is_inner = inward >= 1
+    if not is_inner.any():
+        return front
+    even = EVEN * float(np.sqrt(np.count_nonzero(is_inner)))
+    weight = cv2.GaussianBlur(is_inner.astype(np.float32), (0, 0), even)
+    own = cv2.GaussianBlur(front * is_inner[..., None], (0, 0), even)
+    own /= np.maximum(weight, 1e-6)[..., None]
+    own = fill_in(np.asarray(own, np.float32), is_inner)
+    share = (inward * inward * (3 - 2 * inward))[..., None]
+    return np.where(is_inner[..., None], front, own + share * (front - own)).astype(np.float32)
 
 
 def _resized(image: F32, size: tuple[int, int], how: int = cv2.INTER_AREA) -> F32:

@@ -34,7 +34,10 @@ from ...raster.posed import PosedSplats, RestSplats, projection_jacobians
 from ...raster.reference_layers import Picture3D
 from ...raster.rules import RULES
 from ...raster.texture import build_levels
+from .canvas import bilinear
 from .colours import fill_in
+from .fringe import inwardness
+from .quilting import quilted
 
 AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
@@ -61,6 +64,8 @@ HEIGHT = 600.0  # levels of a patch's tone, from one end of the axis of a turn t
 NEARLY = 1.1  # x the share of a picture of about the right colours: what exceeds 1 is whole
 OTHER = 30.0  # levels, by which the coarse colours of a picture of something else are off
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
+INWARD = 0.7  # of the matte's fringe, up to which its colours are not the object's
+MIX = 2  # px beside a hole that are no texture: they are mixed with it
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
 MOST_TONED = 25.0  # levels, by which a side's tone follows the photo's where they meet
 GAP = 32  # px between the matte and the pictures, and between them
@@ -250,13 +255,19 @@ def _carried(
 def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
     """With the colours of what is not seen as bright as its normals want it, coarsely.
 
-    They are those of the front, which faces elsewhere.
+    They are those of the front, which faces elsewhere. The matte's fringe is not seen, either.
     """
     lifted = rest.lifted
     change = (rest.normals - rest.shown_normals) @ estimate_light(lifted, matte)
     gain = np.exp(change.clip(-BRIGHTEST, BRIGHTEST))[:, None].astype(np.float32)
     colors = (lifted.gaussians.colors * gain).clip(0, 1)
-    own = replace(lifted, gaussians=replace(lifted.gaussians, colors=colors))
+    texture = lifted.texture
+    at = np.asarray(texture.u0 - [matte.left, matte.top] - 0.5, np.float64)
+    is_own = bilinear(inwardness(matte.alpha), at) >= INWARD
+    own = replace(
+        lifted, gaussians=replace(lifted.gaussians, colors=colors),
+        texture=replace(texture, visibility=texture.visibility * is_own),
+    )  # fmt: skip
     return RestSplats(own, photo)
 
 
@@ -303,6 +314,7 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     unknown = cv2.dilate(unknown.astype(np.uint8), np.ones((2 * EDGE + 1,) * 2, np.uint8)) > 0
     known = picture.is_known & ~unknown
     hole = picture.is_object & ~known & wanted
+    hole[:, width:] = False
     if hole.sum() < LEAST or known.sum() < LEAST:
         return None
     scale = min(1.0, (SEARCH / hole.size) ** 0.5)
@@ -335,7 +347,11 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     filled = with_detail(crop, whole, colors, completion.sources)
     share = _alike(completion.colors, coarse, small, sure)
     share = np.where(whole, cv2.resize(share, hole.shape[::-1]), 1.0)[..., None]
-    filled = np.rint(crop + share * (filled.astype(np.float32) - crop))
+    filled = (crop + share * (filled.astype(np.float32) - crop)).astype(np.float32)
+    clear = (known & picture.is_clear).astype(np.uint8)
+    clear = cv2.erode(clear, np.ones((2 * MIX + 1,) * 2, np.uint8)) > 0
+    heights = np.asarray(cv2.resize(tone[..., -1], hole.shape[::-1]) / HEIGHT, np.float32)
+    filled = np.rint(quilted(filled, known, clear, hole, heights, seed).clip(0, 255))
     return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
 
 

@@ -104,7 +104,7 @@ class ReliefSilhouette:
     @cached_property
     def radius(self) -> F64:
         """(h, w) px, of the largest disc in the silhouette that covers a cell; 0 outside."""
-        return _largest_disc(self.depth / self.cell) * self.cell
+        return largest_disc(self.depth / self.cell) * self.cell
 
     @cached_property
     def contour(self) -> tuple[F64, F64]:
@@ -196,7 +196,7 @@ def is_covered(depth, i, j):
 
 
 @numba.njit(cache=True)
-def _largest_disc(depth):
+def largest_disc(depth):
     """(h, w) the largest radius of a disc in the silhouette that covers a cell; `depth` cells."""
     height, width = depth.shape
     largest = depth.copy()

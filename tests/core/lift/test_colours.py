@@ -40,7 +40,7 @@ def _coloured(rgb: F32, is_mirrored: bool, hidden: Mask | None = None, axis=None
     shown = inside if hidden is None else inside & ~hidden
     matte = Matte(0, 0, shown.astype(np.float32), rgb)
     return colouring(
-        ReliefCanvas.of(matte), ReliefSilhouette.of(inside), SPACING, is_mirrored, axis
+        ReliefCanvas.of(matte, hidden), ReliefSilhouette.of(inside), SPACING, is_mirrored, axis
     )
 
 
