@@ -114,7 +114,7 @@ def _matte(matte: Matte, times: int) -> Matte:
         own[..., :3] /= np.maximum(own[..., 3:], 1e-6)
         levels = np.rint(255 * own).astype(np.uint8)
         height, width = small.shape
-        paint = Paint((), matte.paint.spots)
+        paint = Paint((), matte.paint.spots, matte.paint.apart)
         paint = paint.with_pixels((left, top, left + width, top + height), levels)
     return Matte(left, top, small, straight, paint)
 
