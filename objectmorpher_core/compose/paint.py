@@ -31,7 +31,7 @@ from ..raster.rules import RULES
 from ..raster.texture import TextureLevels, build_levels
 from .blend import Box
 from .light.lighting import object_texture
-from .paint_owners import ShownSurface, StrayEdge
+from .paint_owners import ShownSurface, Strays
 
 LEAST_SHARE = 0.04  # of a pixel, that a part must give
 STEEPEST = 5.0  # x the usual texels per px: beyond, two neighbours show different places
@@ -61,7 +61,7 @@ class Seen:
     is_mirrored: Mask  # (N,) it shows what the photo shows of the other side
     alpha: F32  # (h, w) of the object
     color: F32  # (h, w, 3) premultiplied: how it looks, without light and colours of its place
-    stray: StrayEdge | None  # None: all of it shows the photo, its other side as well
+    strays: Strays | None  # None: all of it shows the photo, its other side as well
 
     def mirrored(self, coverage: F32) -> float:
         """Share of what a stroke covers that is a mirrored back: the front is painted with it."""
@@ -76,7 +76,7 @@ def look(splats: PosedSplats, matte: Matte, camera: Camera, box: Box) -> Seen:
     shown = tiles.draw(tiles.prepare(splats, camera, camera), texture, box)
     black = tiles.prepare(splats.recoloured(0 * lifted.gaussians.colors), camera, camera)
     surface = ShownSurface.of(splats, texture, camera, camera, box)
-    stray = _stray(splats, texture)
+    strays = _strays(splats, texture)
     is_side = _is_side(texture, lifted)
     parts = []
     for part in (~is_side, is_side):
@@ -87,8 +87,8 @@ def look(splats: PosedSplats, matte: Matte, camera: Camera, box: Box) -> Seen:
         share = np.minimum(drawn[..., 2], shown.alpha)
         at = drawn[..., :2] / np.maximum(drawn[..., 2:], 1e-6) * np.array([width, height], float)
         at = at + [texture.left, texture.top]
-        if stray is not None and part is not is_side and surface.is_there.any():
-            share = share * ~stray.owners.are_others(at, surface.places)
+        if strays is not None and part is not is_side and surface.is_there.any():
+            share = share * ~strays.owners.are_others(at, surface.places)
         parts.append(SeenPart(at, share))
     spots = np.asarray(camera.project(splats.means) - box[:2], np.float32)
     is_near = splats.means[:, 2] < _sampled(surface.depth, spots) + (
@@ -99,17 +99,17 @@ def look(splats: PosedSplats, matte: Matte, camera: Camera, box: Box) -> Seen:
     # Without colours of its own, all of an object shows the photo.
     is_mirrored = (splats.rest.cosines < 0) & (not splats.rest.splatting.has_colors)
     is_seen = is_near & faces & lifted.is_body
-    if stray is not None:
-        is_seen |= is_near & stray.is_stray
-    return Seen(box, tuple(parts), spots, is_seen, is_mirrored, shown.alpha, shown.color, stray)
+    if strays is not None:
+        is_seen |= is_near & strays.is_stray
+    return Seen(box, tuple(parts), spots, is_seen, is_mirrored, shown.alpha, shown.color, strays)
 
 
-def _stray(splats: PosedSplats, texture: TextureLevels) -> StrayEdge | None:
+def _strays(splats: PosedSplats, texture: TextureLevels) -> Strays | None:
     """None where what the photo does not show has no colours of its own."""
     rest = splats.rest
     if not rest.splatting.has_colors or not rest.is_textured:
         return None
-    return StrayEdge.of(rest, texture)
+    return Strays.of(rest, texture)
 
 
 def with_stroke(
@@ -126,7 +126,7 @@ def with_stroke(
     spots = _sampled(values, seen.spots) * seen.is_seen[:, None]
     rgba = _mixed(sums, unit_pixels(old.crop(box)), opacity)
     dots = _mixed(spots, unit_pixels(old.spots), opacity)
-    return _with_paint(matte, old, box, rgba, dots, seen.stray)
+    return _with_paint(matte, old, box, rgba, dots, seen.strays)
 
 
 def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
@@ -137,7 +137,7 @@ def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
     rgba, dots = unit_pixels(old.crop(box)), unit_pixels(old.spots)
     rgba[..., 3] *= 1 - np.minimum(sums[..., 0], 1)
     dots[:, 3] *= 1 - _sampled(coverage, seen.spots) * seen.is_seen
-    return _with_paint(matte, old, box, rgba, dots, seen.stray)
+    return _with_paint(matte, old, box, rgba, dots, seen.strays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,16 +181,16 @@ def _mixed(sums: F32, below: F32, opacity: float) -> F32:
 
 
 def _with_paint(
-    matte: Matte, old: Paint, box: Box, rgba: F32, spots: F32, stray: StrayEdge | None
+    matte: Matte, old: Paint, box: Box, rgba: F32, spots: F32, strays: Strays | None
 ) -> Matte:
     """With paint (h, w, 4) in [0, 1] in `box`, and on the Gaussians, over that of before."""
     levels, dots = (np.rint(part * 255).clip(0, 255).astype(np.uint8) for part in (rgba, spots))
     for part in (levels, dots):
         part[part[..., 3] <= FAINT] = 0
     paint = replace(old.with_pixels(box, levels), spots=dots)
-    if stray is not None:
-        apart = stray.is_stray & (dots[:, 3] > 0)
-        apart |= stray.meets(paint.crop(matte.box)[..., 3] > 0, matte.left, matte.top)
+    if strays is not None:
+        apart = strays.is_stray & (dots[:, 3] > 0)
+        apart |= strays.meet(paint.crop(matte.box)[..., 3] > 0, matte.left, matte.top)
         paint = replace(paint, apart=apart if apart.any() else None)
     return replace(matte, paint=paint if paint.tiles or dots.any() else None)
 

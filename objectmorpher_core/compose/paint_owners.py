@@ -44,7 +44,7 @@ class ShownSurface:
         is_there = drawn.alpha > SURE
         places = drawn.color / np.maximum(drawn.alpha, 1e-6)[..., None] * size + low
         if is_there.any() and not is_there.all():
-            row, column = distance_transform_edt(
+            row, column = distance_transform_edt(  # type: ignore[misc]
                 ~is_there, return_distances=False, return_indices=True
             )
             places = places[row, column]
@@ -95,26 +95,25 @@ AROUND = (-1.0, 0.0, 1.0)  # x spacing, to either side of what a Gaussian's mean
 
 
 @dataclass(frozen=True, eq=False)
-class StrayEdge:
-    """The Gaussians of an object's soft edge that show what belongs to another surface of it."""
+class Strays:
+    """The Gaussians of an object that show what belongs to another surface of it."""
 
     owners: TexelOwners
     rest: RestSplats
-    is_stray: Mask  # (N,)
+    is_stray: Mask  # (N,) they do, if they show the photo
 
     @staticmethod
-    def of(rest: RestSplats, texture: TextureLevels) -> StrayEdge:
-        owners, lifted = TexelOwners.of(rest, texture), rest.lifted
-        is_stray = ~lifted.is_body & owners.are_others(lifted.texture.u0, rest.means)
-        return StrayEdge(owners, rest, is_stray)
+    def of(rest: RestSplats, texture: TextureLevels) -> Strays:
+        owners = TexelOwners.of(rest, texture)
+        return Strays(owners, rest, owners.are_others(rest.lifted.texture.u0, rest.means))
 
-    def meets(self, painted: Mask, left: int, top: int) -> Mask:
-        """(N,) which of them show texels of another surface that are `painted` (h, w).
+    def meet(self, painted: Mask, left: int, top: int) -> Mask:
+        """(N,) which of the soft edge's show texels of another surface that are `painted` (h, w).
 
         `left`, `top`: px of the photo, their corner.
         """
         found, (height, width) = np.zeros(len(self.rest), bool), painted.shape
-        index = np.flatnonzero(self.is_stray)
+        index = np.flatnonzero(self.is_stray & ~self.rest.lifted.is_body)
         for step in itertools.product(AROUND, AROUND):
             texels = self.rest.lifted.texture.u0[index] + self.rest.spacing_px * np.array(step)
             column, row = (np.floor(texels).astype(np.int64) - [left, top]).T
