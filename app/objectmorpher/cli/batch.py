@@ -27,6 +27,7 @@ from objectmorpher_core.scripting.script import (
 )
 
 from .commands import check_outputs, edited_by, json_bytes
+from .idle import refuse_idle, said_on
 from .ray import check_ray
 from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
@@ -50,6 +51,7 @@ class Task:
 
 def run_batch(options: argparse.Namespace) -> None:
     """`objectmorpher batch`. Raises RuntimeError at the end where an edit has failed."""
+    refuse_idle("batch", said_on(options, options.parser))
     if options.report:
         scripts = [path for path in _files(options.scripts, (".json",)) if not _is_report(path)]
         check_outputs(scripts, {options.report: (".json",)})
