@@ -120,9 +120,6 @@ def run_edit(options: argparse.Namespace) -> None:
     lines: list[str] = []
     clip = _clip(options)
     notes: tuple[str, ...] = ()
-    if len(items) == 1:
-        said = {**said_by(items[0].script), "objects": items[0].others.objects}
-        notes = refuse_idle("edit", said | said_on(options, options.parser))
     for item in items:
         out = Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
@@ -134,6 +131,9 @@ def run_edit(options: argparse.Namespace) -> None:
         everything = [*outputs, out, *extras.values()]
         _check_distinct(everything)
         refuse_missing(item.script, item.others)
+        if len(items) == 1:
+            said = {**said_by(item.script), "objects": item.others.objects}
+            notes = refuse_idle("edit", said | said_on(options, options.parser))
         written, line = _edit_one(item, extras, clip)
         outputs |= written
         lines.append(line)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from objectmorpher_core.compose import refine
 from objectmorpher_core.scripting.options import FINISH, POSE, options_of
 
 from .terminal import UsageError
@@ -49,6 +48,8 @@ def _makes_all(said: Said) -> bool:
 
 
 def _has_no_network(said: Said) -> bool:
+    from objectmorpher_core.compose import refine
+
     return said.get("refine") not in refine.BACKENDS and not said.get("objects")
 
 
@@ -79,16 +80,15 @@ OF_A_WINDOW = ("renderer", "theme", "scale", "size", "return", "frames", "screen
 IDLE: dict[str, tuple[Idle, ...]] = {
     "edit": (
         Idle(("flip",), without("splats"), "without --splats, whose file it turns"),
-        Idle(
-            ("lift", *RELIEF), beside("splats"), "beside --splats, whose file is the shape"
-        ),
-        Idle(RELIEF, _makes_all, "with this --lift, which makes the shape by itself"),
+        Idle(("lift",), beside("splats"), "beside --splats, whose file is the shape"),
+        Idle(RELIEF, beside("splats"), "beside --splats, whose file is the shape", is_refused=False),
+        Idle(RELIEF, _makes_all, "with a --lift that makes the shape by itself", is_refused=False),
         Idle(
             ("refine_strength",), _has_no_network,
-            f"without a network that refines: --refine {' or '.join(refine.BACKENDS)}",
+            "without a network that refines, such as --refine klein",
         ),
         Idle(PLACED, _is_gone, "beside --remove, which takes the object away"),
-        Idle(("key",), _is_of_video, "without --video keys or --session"),
+        Idle(("key",), _is_of_video, "without --video keys or --session", is_refused=False),
         Idle(DEFORMED, _is_still, "without --handle, which is what bends it", is_refused=False),
         VIDEO,
     ),
