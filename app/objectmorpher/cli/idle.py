@@ -81,7 +81,7 @@ IDLE: dict[str, tuple[Idle, ...]] = {
     "edit": (
         Idle(("flip",), without("splats"), "without --splats, whose file it turns"),
         Idle(("lift",), beside("splats"), "beside --splats, whose file is the shape"),
-        Idle(RELIEF, beside("splats"), "beside --splats, whose file is the shape", is_refused=False),
+        Idle(RELIEF, beside("splats"), "beside --splats, which brings its shape", is_refused=False),
         Idle(RELIEF, _makes_all, "with a --lift that makes the shape by itself", is_refused=False),
         Idle(
             ("refine_strength",), _has_no_network,

@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from objectmorpher.cli.parser import main
 from objectmorpher.server.web_editor import MOST_EDITS, WebServer, posed_as_shown
 from objectmorpher_core.base.rotations import quats_from_matrices
 from objectmorpher_core.deform.puppet import puppet_of
@@ -87,14 +88,17 @@ def test_without_the_token_only_the_page_is_there(server: WebServer) -> None:
 def test_nonsense_is_answered_with_a_sentence_and_hurts_nobody(server: WebServer) -> None:
     assert ask(server, "POST", "/web/edits", b"no picture")[0] == 400
     edit = opened(server, (SAMPLES / "bowl.jpg").read_bytes())
-    for body in (b"", b"[]", b"{", b"\xff"):
-        assert ask(server, "POST", f"{edit}/select", body)[0] in (400, 411)
+    for body in (b"", b"[]", b"{", b"\xff", b"[" * 100_000, b'{"clicks": [[5, 5]]}'):
+        status, answer = ask(server, "POST", f"{edit}/select", body)
+        assert status in (400, 411) and json.loads(answer)["error"]
     for asked in (
         {}, {"click": [[1]]}, {"click": "here"}, {"click": [[-1, 5]]}, {"click": [[1e9, 5]]},
         {"click": [["a", "b"]]}, {"click": [[1, 1]] * 1000}, {"click": [[float("nan"), 1]]},
+        {"click": [["5", "6"]]}, {"click": [[True, 5]]}, {"click": [[10**400, 1]]},
+        {"click": [5, 5]}, {"click": {"x": 5}}, {"subject": "yes"}, {"click": None},
     ):  # fmt: skip
         told = last_line(server, f"{edit}/select", asked)
-        assert told["state"] == "failed" and told["error"]
+        assert told["state"] == "failed" and told["error"] and "failed" not in told["error"]
     assert last_line(server, f"{edit}/lift", {})["error"] == "click the object first"
     for what in ("mask", "page", "files/photo", "files/x", "elsewhere"):
         assert ask(server, "GET", f"{edit}/{what}")[0] == 404
@@ -143,6 +147,7 @@ def shown(count: int, **more: Any) -> dict[str, Any]:
     {"turn": [0] * 9}, {"turn": [1] * 8}, {"shift": ["a", 1, 2]},
     {"turn": [-1, 0, 0, 0, 1, 0, 0, 0, 1]}, {"turn": [2, 0, 0, 0, 1, 0, 0, 0, 1]},
     {"shift": [0, 0, float("nan")]}, {"shift": [0, 0, -1e5]}, {"quats": "*"},
+    {"shift": None}, {"turn": [10**400] * 9}, {"turn": {"a": 1}}, {"shift": ["1", "2", "3"]},
 ])  # fmt: skip
 def test_a_pose_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(EditError):
@@ -166,6 +171,32 @@ def test_the_pose_of_the_page_is_the_documents() -> None:
     np.testing.assert_allclose(turns, np.tile([1.0, 0, 0, 0], (len(rest), 1)), atol=1e-9)
     motion = posed.placement.matrix(lifted, scene().photo.camera)
     np.testing.assert_allclose(motion, np.eye(4), atol=1e-9)
+
+
+def test_an_edit_by_http_gives_the_very_pixels_of_the_command_line(
+    server: WebServer, tmp_path: Path
+) -> None:
+    source = SAMPLES / "bowl.jpg"
+    edit = opened(server, source.read_bytes())
+    assert last_line(server, f"{edit}/select", {"click": [[500, 340]]})["state"] == "done"
+    assert last_line(server, f"{edit}/lift", {})["state"] == "done"
+    document = server.find(edit.rpartition("/")[2]).lifted
+    assert document is not None
+    item, camera = document.objects[0], document.photo.camera
+    assert item.lifted is not None
+    rest = puppet_of(item, camera).deformer.points
+    motion = Placement(turn=(20.0, 0.0, 0.0)).matrix(item.lifted, camera)
+    motion = motion @ item.lifted.world_from_object
+    question = {
+        "what": "photo", "points": base64.b64encode(rest.astype("<f4").tobytes()).decode(),
+        "quats": base64.b64encode(np.tile([1, 0, 0, 0], (len(rest), 1)).astype("<f4")).decode(),
+        "turn": motion[:3, :3].ravel().tolist(), "shift": motion[:3, 3].tolist(),
+    }  # fmt: skip
+    assert last_line(server, f"{edit}/render", question)["state"] == "done"
+    made = ask(server, "GET", f"{edit}/files/photo")[1]
+    out = tmp_path / "out.png"
+    assert main(["edit", str(source), "--click", "500,340", "--turn", "20", "-o", str(out)]) == 0
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(made))), np.asarray(Image.open(out)))
 
 
 # ---- with a browser ---------------------------------------------------------------------------
