@@ -8,7 +8,7 @@
     POST /web/edits/ID/lift              {}
     POST /web/edits/ID/render            {"what": one of FILES, "points", "quats", "turn", "shift"}:
                                          the state of the page of `objectmorpher share`
-    GET  /web/edits/ID/about             {"id", "size"}
+    GET  /web/edits/ID/about             {"id", "size", "is_chosen", "is_lifted"}
     GET  /web/edits/ID/photo|mask|page   pictures, and that page
     GET  /web/edits/ID/files/WHAT        what was rendered last
 
@@ -314,7 +314,10 @@ class _WebHandler(Handler):
             return
         edit, name, what = self._meant()
         if what == "about":
-            self.send_json(HTTPStatus.OK, {"id": name, "size": edit.opened.photo.size})
+            self.send_json(HTTPStatus.OK, {
+                "id": name, "size": edit.opened.photo.size,
+                "is_chosen": edit.chosen is not None, "is_lifted": edit.lifted is not None,
+            })  # fmt: skip
             return
         try:
             body, kind = edit.show(what)

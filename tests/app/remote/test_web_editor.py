@@ -6,6 +6,7 @@ import base64
 import http.client
 import io
 import json
+import time
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -246,3 +247,95 @@ def test_a_visitor_opens_clicks_lifts_turns_and_saves(server: WebServer) -> None
     assert edited.shape == photo.shape and 0.02 < changed.mean() < 0.6
     item = decode_session(files["session"][1]).objects[0]
     np.testing.assert_allclose(item.placement.turn, (15, 0, 0), atol=1e-3)
+
+
+def choose(page: Browser, name: str) -> None:
+    page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+    page.run(f"document.querySelector('#samples img[alt={name}]').parentElement.click()")
+
+
+def select_middle(page: Browser) -> None:
+    place = screen_place(page, 0.5, 0.5)
+    page.drag(place, place)
+    page.wait("!document.getElementById('lift').disabled", "the selection")
+
+
+STEP = "document.body.dataset.step"
+# What is asked for waits so long, ms, by how its address ends; each is taken once.
+SLOWLY = """
+    const real = window.fetch, waits = %s;
+    window.fetch = async (path, options) => {
+      const end = Object.keys(waits).find((end) => String(path).endsWith(end));
+      const [ms] = end ? waits[end].splice(0, 1) : [0];
+      await new Promise((go) => setTimeout(go, ms || 0));
+      return real(path, options);
+    };
+"""
+
+
+@pytest.mark.slow
+def test_a_page_that_is_loaded_again_goes_on_with_its_edit(server: WebServer) -> None:
+    with opened_browser() as page:
+        page.open(f"{server.url}/#token={TOKEN}")
+        choose(page, "coffee")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        page.open(f"{server.url}/")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        select_middle(page)
+        page.open(f"{server.url}/")
+        page.wait("edit?.isChosen", "the selection")
+        page.run("document.getElementById('lift').click()")
+        page.wait(f"{STEP} === 'drag'", "lifting")
+        page.open(f"{server.url}/")
+        page.wait(f"{STEP} === 'drag'", "the object")
+        frame = "document.getElementById('frame').contentWindow"
+        page.wait(f"{frame}.objectmorpher && {frame}.objectmorpher.isStill", "drawing")
+        page.run("document.getElementById('other').click()")
+        page.wait(f"{STEP} === 'open'", "leaving")
+        page.open(f"{server.url}/")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        assert page.run(f"return {STEP}") == "open"
+        page.run("sessionStorage.setItem('edit', JSON.stringify({id: 'gone', isSent: false}))")
+        page.open(f"{server.url}/")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        assert page.run(f"return {STEP}") == "open"
+
+
+@pytest.mark.slow
+def test_what_arrives_late_does_not_replace_what_was_opened_or_left_since(
+    server: WebServer,
+) -> None:
+    with opened_browser() as page:
+        page.open(f"{server.url}/#token={TOKEN}")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        page.run(SLOWLY % "{'web/edits': [2500, 0], '/page': [2500]}")
+        choose(page, "coffee")
+        choose(page, "flower")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        shown = "[edit.size[0], document.getElementById('photo').naturalWidth]"
+        assert page.run(f"return {shown}") == [640, 640]
+        time.sleep(4)
+        assert page.run(f"return {shown}") == [640, 640], "the coffee came last"
+        select_middle(page)
+        page.run("document.getElementById('lift').click()")
+        page.wait("stop === null", "lifting")
+        page.run("document.getElementById('other').click()")
+        time.sleep(4)
+        assert page.run(f"return {STEP}") == "open"
+
+
+@pytest.mark.slow
+def test_in_a_narrow_window_nothing_lies_over_anything_else(server: WebServer) -> None:
+    with opened_browser() as page:
+        page.resize(400, 760)
+        page.open(f"{server.url}/#token={TOKEN}")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        below = "const b = (id) => document.getElementById(id).getBoundingClientRect();"
+        assert page.run(f"{below} return b('drop').bottom <= b('hint').top")
+        choose(page, "coffee")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        select_middle(page)
+        page.run("document.getElementById('lift').click()")
+        page.wait(f"{STEP} === 'drag'", "lifting")
+        assert page.run("return document.documentElement.scrollWidth <= innerWidth")
+        assert page.run(f"{below} return b('frame').bottom <= b('hint').top")
