@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -120,3 +121,14 @@ def test_a_second_file_is_no_edit_without_a_display(
     assert "one photo is edited at a time" in capsys.readouterr().err
     options = window_parser().parse_args(["coffee.png", "--fov", "40"])
     assert options.fov == 40.0
+
+
+def test_a_batch_refuses_photos_that_no_script_uses(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    script = folder / "edit.json"
+    script.write_text(json.dumps({"photo": "coffee.png", "out": "o.png", "mask": "mask.png"}))
+    saved("chelsea", folder)
+    assert main(["batch", "edit.json", "--photo", "chelsea.png"]) == 1
+    assert "--photo has no effect" in capsys.readouterr().err
+    assert not (folder / "o.png").exists()

@@ -61,6 +61,7 @@ def run_batch(options: argparse.Namespace) -> None:
     tasks = list(_tasks(options))
     if not tasks:
         raise UsageError("there is no script to run")
+    _refuse_unused(tasks, options)
     if options.out is not None:
         make_folder(options.out)
     entries: dict[int, dict[str, Any]] = {}
@@ -68,6 +69,16 @@ def run_batch(options: argparse.Namespace) -> None:
         entries[number] = entry
         _say(entry)
     _finish([entries[number] for number in sorted(entries)], options.report)
+
+
+def _refuse_unused(tasks: list[Task], options: argparse.Namespace) -> None:
+    """Raises UsageError where photos are given that no script has a use for."""
+    items = [task.item for task in tasks]
+    if None in items:  # a script that cannot be read might have had
+        return
+    photos = {str(photo) for photo in _files(options.photo or [], READ_ENDINGS)}
+    if photos and not any(item and item.photo in photos for item in items):
+        raise UsageError('--photo has no effect: every script names its own "photo"')
 
 
 def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
