@@ -9,9 +9,10 @@
 in vec4 place;   // xyz object frame, opacity
 in vec4 quat;    // wxyz
 in vec4 size;    // standard deviations, object units; cosine of the normal at rest
-in vec4 normal;  // object frame; visibility
+in vec3 normal;  // object frame
 in vec3 look;    // u0 minus where the mean is seen at rest, photo px; solidity
 in vec4 paint;   // colour; zoom, px per world unit at rest
+in float visibility;
 in vec3 side0;   // px per unit of the object at rest, of an invented picture: across,
 in vec3 side1;   // and down
 in vec3 aside;   // `look` there; its zoom, 0: there is none
@@ -83,7 +84,7 @@ mat3 covariance_root() {
 // Cosine of the moved normal with the way to the camera. Normals move by cofactors.
 float facing(mat3 f, vec3 at) {
     mat3 cofactors = mat3(cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1]));
-    vec3 moved = cofactors * normal.xyz;
+    vec3 moved = cofactors * normal;
     moved *= dot(f[0], cofactors[0]) >= 0.0 ? 1.0 : -1.0;
     vec3 way = at * linear;
     return -dot(moved, way) / max(length(moved) * length(way), 1e-30);
@@ -102,7 +103,7 @@ vec4 axes(vec3 covariance, float det, float cut) {
 }
 
 void main() {
-    float opacity = place.w, seen = normal.w, zoom = paint.w;
+    float opacity = place.w, seen = visibility, zoom = paint.w;
     // where it is now, and how its surroundings have moved
     vec3 shift;
     mat3 grown;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import atexit
 import os
 import sys
@@ -58,8 +59,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         is_question = {"-h", "--help", "--version"} & set(arguments)
         return cli.main(arguments) if is_question else _run_command(arguments)
     options = cli.parse_window(arguments)
+    if (wrong := cli.idle_in_window(options, has_display())) is not None:
+        print(f"{cli.PROGRAM}: {wrong}", file=sys.stderr)
+        return cli.FAILED
     if not has_display():
-        return _edit_headless(next(iter(options.files), None))
+        return _edit_headless(options)
     return _run_window(cli.window_options(options))
 
 
@@ -131,17 +135,20 @@ def has_display() -> bool:
     return True
 
 
-def _edit_headless(photo: Path | None) -> int:
+def _edit_headless(options: argparse.Namespace) -> int:
     """Without a screen: the sample edit, or a turn of the photo's subject, into a file."""
     from .cli import parser as cli
     from .system.resources import resource
 
+    photo: Path | None = next(iter(options.files), None)
     choice = SAMPLE_EDIT if photo is None else ("--subject", *SAMPLE_EDIT[2:])
     photo = photo or resource(cli.SAMPLE)
     if photo.suffix.lower() == ".omorph":
         arguments = ["replay", str(photo), "-o", str(HEADLESS_OUT)]
     else:
         arguments = ["edit", str(photo), *choice, "-o", str(HEADLESS_OUT)]
+        arguments += [] if options.fov is None else [f"--fov={options.fov:g}"]
+        arguments += [f"--seed={options.seed}"] if options.seed else []
     print(f"There is no display, so this edit runs without a window:\n  {' '.join(arguments)}")
     code = cli.main(arguments)
     if code == 0:

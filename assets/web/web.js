@@ -19,6 +19,7 @@ const HINTS = {
 const ALL = [...new Set(Object.values(SHOWN).flat())];
 
 let token = "", edit = null, clicks = [], isSubject = false, isWithout = false, asked = 0, stop = null;
+let opening = 0;  // how often an edit was begun, or left
 let pageUrl = null, most = Infinity;
 
 // ---- the server ------------------------------------------------------------------------------
@@ -102,23 +103,54 @@ const guarded = (work) => (...given) => work(...given).catch(report);
 
 async function open(file, name) {
   if (file.size > most) throw new Error(`A photo may have at most ${Math.floor(most / 2 ** 20)} MB here.`);
+  const own = ++opening;
   say("Opening the photo");
   const answer = await fetched("web/edits",
     { method: "POST", body: file, headers: { "X-Name": encodeURIComponent(name) } });
-  await begun({ ...await answer.json(), isSent: false });
+  await begun({ ...await answer.json(), isSent: false }, own);
 }
 
-// An edit that another program began is sent back to it.
-async function begun(about) {
+// An edit that another program began is sent back to it. Nothing of one is shown if, meanwhile,
+// another one was opened, or this one was left.
+async function begun(about, own) {
+  const seen = await (await fetched(`web/edits/${about.id}/photo`)).blob();
+  if (own !== opening) return;
+  stop?.abort();
+  asked++;
   edit = { ...about, isChosen: false };
   [clicks, isSubject] = [[], false];
-  const seen = await fetched(`web/edits/${edit.id}/photo`);
+  sessionStorage.setItem("edit", JSON.stringify({ id: edit.id, isSent: edit.isSent }));
   URL.revokeObjectURL($("photo").src);
-  $("photo").src = URL.createObjectURL(await seen.blob());
+  $("photo").src = URL.createObjectURL(seen);
   await $("photo").decode();
+  if (own !== opening) return;
   $("stage").style.setProperty("--ratio", String(edit.size[0] / edit.size[1]));
   clear();
   show("select");
+}
+
+// The edit that this tab showed before it was loaded again; false where it is not kept any more.
+async function resumed() {
+  const kept = JSON.parse(sessionStorage.getItem("edit") || "null");
+  if (!kept) return false;
+  const about = await fetched(`web/edits/${encodeURIComponent(kept.id)}/about`).catch((error) => {
+    if (document.body.dataset.step === "ask") throw error;
+    return null;
+  });
+  if (!about) { sessionStorage.removeItem("edit"); return false; }
+  const told = await about.json();
+  await begun({ ...told, isSent: kept.isSent }, ++opening);
+  if (told.is_chosen) await shownMask(++asked);
+  if (told.is_lifted) await shownObject(++asked);
+  return true;
+}
+
+function leave() {
+  stop?.abort();
+  [opening, asked] = [opening + 1, asked + 1];
+  sessionStorage.removeItem("edit");
+  show("open");
+  if (!$("samples").children.length) return samples();
 }
 
 function clear() {
@@ -151,7 +183,10 @@ async function select() {
     click: clicks.filter((c) => c.isMeant).map((c) => c.xy),
     not_click: clicks.filter((c) => !c.isMeant).map((c) => c.xy), subject: isSubject,
   });
-  if (number !== asked) return;
+  if (number === asked) await shownMask(number);
+}
+
+async function shownMask(number) {
   const mask = await createImageBitmap(await (await fetched(`web/edits/${edit.id}/mask`)).blob());
   if (number !== asked) return;
   edit.isChosen = true;
@@ -207,8 +242,14 @@ function without(is) {
 // ---- dragging and saving ---------------------------------------------------------------------
 
 async function lift() {
+  const number = ++asked;
   await done("lift", {});
+  if (number === asked) await shownObject(number);
+}
+
+async function shownObject(number) {
   const page = await (await fetched(`web/edits/${edit.id}/page`)).text();
+  if (number !== asked) return;
   if (pageUrl) URL.revokeObjectURL(pageUrl);
   pageUrl = URL.createObjectURL(new Blob([page], { type: "text/html" }));
   $("frame").src = pageUrl;
@@ -247,9 +288,10 @@ async function save(what) {
 async function begin() {
   if (sent) {
     const about = await fetched(`web/edits/${encodeURIComponent(sent)}/about`);
-    await begun({ ...await about.json(), isSent: true });
+    await begun({ ...await about.json(), isSent: true }, ++opening);
     return;
   }
+  if (await resumed()) return;
   show("open");
   await samples();
 }
@@ -270,7 +312,7 @@ $("back").addEventListener("click", () => show("select"));
 $("session").addEventListener("click", guarded(() => save("session")));
 $("save").addEventListener("click", guarded(() => save("photo")));
 $("send").addEventListener("click", guarded(() => save("layers")));
-$("other").addEventListener("click", () => { stop?.abort(); show("open"); });
+$("other").addEventListener("click", guarded(async () => leave()));
 $("ask").addEventListener("submit", guarded(async (event) => {
   event.preventDefault();
   token = $("token").value.trim();

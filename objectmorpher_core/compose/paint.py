@@ -7,7 +7,9 @@ a stroke lands on both, and no seam is left. Between neighbouring pixels the pla
 each little square of the picture covers its part of the texture, however far it is drawn out.
 
 What has neither the photo nor an invented picture shows the plain colours of its Gaussians: a
-stroke colours those that are seen under it, too, as finely as they lie.
+stroke colours those that are seen under it, too, as finely as they lie. So it does where a pixel
+shows a texel of another surface (`paint_owners`): the texel stays, and the Gaussians that showed it
+do not any more.
 """
 
 from __future__ import annotations
@@ -24,9 +26,12 @@ from ..document.model import LiftedObject, Matte
 from ..document.paint import Paint
 from ..raster import tiles
 from ..raster.posed import PosedSplats
+from ..raster.reference import moved_cosines
+from ..raster.rules import RULES
 from ..raster.texture import TextureLevels, build_levels
 from .blend import Box
 from .light.lighting import object_texture
+from .paint_owners import ShownSurface, Strays
 
 LEAST_SHARE = 0.04  # of a pixel, that a part must give
 STEEPEST = 5.0  # x the usual texels per px: beyond, two neighbours show different places
@@ -52,10 +57,11 @@ class Seen:
     box: Box  # px of the picture
     parts: tuple[SeenPart, ...]
     spots: F32  # (N, 2) px of the box, where each Gaussian is
-    is_seen: Mask  # (N,) and nothing stands before it
+    is_seen: Mask  # (N,) and nothing stands before it: it takes paint
     is_mirrored: Mask  # (N,) it shows what the photo shows of the other side
     alpha: F32  # (h, w) of the object
     color: F32  # (h, w, 3) premultiplied: how it looks, without light and colours of its place
+    strays: Strays | None  # None: all of it shows the photo, its other side as well
 
     def mirrored(self, coverage: F32) -> float:
         """Share of what a stroke covers that is a mirrored back: the front is painted with it."""
@@ -69,6 +75,8 @@ def look(splats: PosedSplats, matte: Matte, camera: Camera, box: Box) -> Seen:
     texture = object_texture(matte, lifted)
     shown = tiles.draw(tiles.prepare(splats, camera, camera), texture, box)
     black = tiles.prepare(splats.recoloured(0 * lifted.gaussians.colors), camera, camera)
+    surface = ShownSurface.of(splats, texture, camera, camera, box)
+    strays = _strays(splats, texture)
     is_side = _is_side(texture, lifted)
     parts = []
     for part in (~is_side, is_side):
@@ -78,14 +86,30 @@ def look(splats: PosedSplats, matte: Matte, camera: Camera, box: Box) -> Seen:
         height, width = part.shape
         share = np.minimum(drawn[..., 2], shown.alpha)
         at = drawn[..., :2] / np.maximum(drawn[..., 2:], 1e-6) * np.array([width, height], float)
-        parts.append(SeenPart(at + [texture.left, texture.top], share))
+        at = at + [texture.left, texture.top]
+        if strays is not None and part is not is_side and surface.is_there.any():
+            share = share * ~strays.owners.are_others(at, surface.places)
+        parts.append(SeenPart(at, share))
     spots = np.asarray(camera.project(splats.means) - box[:2], np.float32)
-    depth = _sampled(np.where(np.isfinite(shown.depth), shown.depth, 0), spots)
-    is_near = splats.means[:, 2] < depth + NEAR * splats.rest.spacing * splats.scale
+    is_near = splats.means[:, 2] < _sampled(surface.depth, spots) + (
+        NEAR * splats.rest.spacing * splats.scale
+    )
+    ramp = RULES.facing_ramp * lifted.texture.visibility
+    faces = moved_cosines(splats.rest.normals, splats.linear, splats.means) > -ramp
     # Without colours of its own, all of an object shows the photo.
     is_mirrored = (splats.rest.cosines < 0) & (not splats.rest.splatting.has_colors)
-    is_seen = is_near & lifted.is_body
-    return Seen(box, tuple(parts), spots, is_seen, is_mirrored, shown.alpha, shown.color)
+    is_seen = is_near & faces & lifted.is_body
+    if strays is not None:
+        is_seen |= is_near & strays.is_stray
+    return Seen(box, tuple(parts), spots, is_seen, is_mirrored, shown.alpha, shown.color, strays)
+
+
+def _strays(splats: PosedSplats, texture: TextureLevels) -> Strays | None:
+    """None where what the photo does not show has no colours of its own."""
+    rest = splats.rest
+    if not rest.splatting.has_colors or not rest.is_textured:
+        return None
+    return Strays.of(rest, texture)
 
 
 def with_stroke(
@@ -101,7 +125,8 @@ def with_stroke(
     box, sums = _on_texture(seen, values)
     spots = _sampled(values, seen.spots) * seen.is_seen[:, None]
     rgba = _mixed(sums, unit_pixels(old.crop(box)), opacity)
-    return _with_paint(matte, old, box, rgba, _mixed(spots, unit_pixels(old.spots), opacity))
+    dots = _mixed(spots, unit_pixels(old.spots), opacity)
+    return _with_paint(matte, old, box, rgba, dots, seen.strays)
 
 
 def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
@@ -112,7 +137,7 @@ def without_stroke(matte: Matte, seen: Seen, coverage: F32) -> Matte:
     rgba, dots = unit_pixels(old.crop(box)), unit_pixels(old.spots)
     rgba[..., 3] *= 1 - np.minimum(sums[..., 0], 1)
     dots[:, 3] *= 1 - _sampled(coverage, seen.spots) * seen.is_seen
-    return _with_paint(matte, old, box, rgba, dots)
+    return _with_paint(matte, old, box, rgba, dots, seen.strays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,12 +180,18 @@ def _mixed(sums: F32, below: F32, opacity: float) -> F32:
     return np.asarray(np.concatenate([mixed, own + rest], axis=-1), np.float32)
 
 
-def _with_paint(matte: Matte, old: Paint, box: Box, rgba: F32, spots: F32) -> Matte:
+def _with_paint(
+    matte: Matte, old: Paint, box: Box, rgba: F32, spots: F32, strays: Strays | None
+) -> Matte:
     """With paint (h, w, 4) in [0, 1] in `box`, and on the Gaussians, over that of before."""
     levels, dots = (np.rint(part * 255).clip(0, 255).astype(np.uint8) for part in (rgba, spots))
     for part in (levels, dots):
         part[part[..., 3] <= FAINT] = 0
     paint = replace(old.with_pixels(box, levels), spots=dots)
+    if strays is not None:
+        apart = strays.is_stray & (dots[:, 3] > 0)
+        apart |= strays.meet(paint.crop(matte.box)[..., 3] > 0, matte.left, matte.top)
+        paint = replace(paint, apart=apart if apart.any() else None)
     return replace(matte, paint=paint if paint.tiles or dots.any() else None)
 
 

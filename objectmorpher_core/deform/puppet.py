@@ -80,10 +80,10 @@ class Puppet:
         other._similar, other._deformer = self._deformer or self._similar, None
         return other
 
-    def recoloured(self, lifted: LiftedObject) -> Puppet:
-        """Return the same object in the plain colours of `lifted`, alike but for them."""
+    def painted_as(self, lifted: LiftedObject) -> Puppet:
+        """Return the same object painted as `lifted`: with its plain colours and visibility."""
         other = copy.copy(self)
-        other.lifted, other._rest = lifted, self._rest.recoloured(lifted.gaussians.colors)
+        other.lifted, other._rest = lifted, self._rest.changed_to(lifted)
         vars(other).pop("_draft_rest", None)
         other._lock = Lock()
         return other

@@ -429,12 +429,13 @@ class EditObject:
 
     @property
     def shown(self) -> LiftedObject | None:
-        """Return its lift with the paint on its plain colours; for the rest see `Matte.shown`."""
+        """Return its lift with the paint on its Gaussians; for the texture's see `Matte.shown`."""
         if self.lifted is None or self.matte is None or self.matte.paint is None:
             return self.lifted
-        gaussians = self.lifted.gaussians
-        colors = self.matte.paint.on_spots(gaussians.colors)
-        return replace(self.lifted, gaussians=replace(gaussians, colors=colors))
+        gaussians, texture, paint = self.lifted.gaussians, self.lifted.texture, self.matte.paint
+        gaussians = replace(gaussians, colors=paint.on_spots(gaussians.colors))
+        texture = replace(texture, visibility=paint.visible(texture.visibility))
+        return replace(self.lifted, gaussians=gaussians, texture=texture)
 
     @property
     def selection(self) -> Selection | None:

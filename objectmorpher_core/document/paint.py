@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F32, U8, frozen
+from ..base.arrays import F32, U8, Mask, frozen
 from ..base.pixels import crop
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 SIDE = 512  # px, of a tile
+# Visibility of what does not show the photo: more than 0, which hides at rest what faces the camera
+HARDLY = np.float32(1e-6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +35,19 @@ class PaintTile:
 class Paint:
     """Paint over an object's texture: over its colours, and the invented pictures beside them.
 
-    And over the plain colours of its Gaussians, which show where it has neither.
+    And over the plain colours of its Gaussians, which show where it has neither. Where the soft
+    edge shows the texels of another surface of the object, it would show that one's paint, and
+    hide its own: where either is painted it is `apart`, and shows nothing.
     """
 
     tiles: tuple[PaintTile, ...]
     spots: U8  # (N, 4) on each Gaussian, sRGB, straight
+    apart: Mask | None = None  # (N,) which of them do not show the texture any more; None: none
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "spots", frozen(self.spots, np.uint8))
+        if self.apart is not None:
+            object.__setattr__(self, "apart", frozen(self.apart, np.bool_))
 
     def crop(self, box: Box) -> U8:
         """(h, w, 4) what of it lies in a box of the texture, px of the photo."""
@@ -82,6 +89,12 @@ class Paint:
     def on_spots(self, colours: F32) -> F32:
         """(N, 3) the Gaussians' plain `colours` (N, 3) under it."""
         return _over(self.spots, colours)
+
+    def visible(self, visibility: F32) -> F32:
+        """(N,) `visibility` in the photo (N,) of those that still show the texture."""
+        if self.apart is None:
+            return visibility
+        return np.where(self.apart, np.minimum(visibility, HARDLY), visibility)
 
 
 def _over(rgba: U8, colours: F32) -> F32:

@@ -126,10 +126,12 @@ def _repainted(matte: Matte, item: EditObject, lifted: LiftedObject) -> Matte:
     reach = HANDLE_STILL_THERE * old.spacing * old.scale
     before = KDTree(old.world_points(old.gaussians.means))
     gaps, nearest = before.query(lifted.world_points(lifted.gaussians.means))
-    spots = np.where((gaps < reach)[:, None], paint.spots[nearest], 0)
-    paint, sides = replace(paint, spots=spots), (old.sides, lifted.sides)
+    is_there = gaps < reach
+    spots = np.where(is_there[:, None], paint.spots[nearest], 0)
+    apart = None if paint.apart is None else is_there & paint.apart[nearest]
+    paint, sides = replace(paint, spots=spots, apart=apart), (old.sides, lifted.sides)
     if sides[0] is None or sides[1] is None or not _same_pictures(sides[0], sides[1]):
-        paint = Paint((), paint.spots).with_pixels(matte.box, paint.crop(matte.box))
+        paint = Paint((), spots, apart).with_pixels(matte.box, paint.crop(matte.box))
     return replace(matte, paint=paint)
 
 

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from ..base.arrays import RGB
+from ..base.arrays import RGB, U8
 from ..base.library_output import logged_output
 from .image import at_most
 
@@ -26,6 +26,8 @@ ENDINGS = (*CODECS, *PICTURES)
 GIF_LONGEST = 640  # px
 GIF_TICK = 10  # ms, of which a GIF's frames last whole numbers
 WEBP_QUALITY = 85
+CLEAR = 255  # the colour of a GIF that is none
+MOST_FRAMES = 3000
 
 
 class VideoError(ValueError):
@@ -67,8 +69,11 @@ def _opened(path: Path) -> cv2.VideoCapture:
     return video
 
 
-def encode_video(frames: Iterable[RGB], rate: float, ending: str) -> bytes:
+def encode_video(frames: Iterable[RGB], rate: float, ending: str, alpha: U8 | None = None) -> bytes:
     """The file of `frames` (h, w, 3), all of one size, shown `rate` a second, for ever.
+
+    `alpha` (h, w) of all of them: WebP keeps it, GIF whether a pixel is there; films have none,
+    and an even number of rows and columns: the last one is left out.
 
     Raises VideoError for an unknown ending, no frames, and where the encoder is not there.
     """
@@ -82,19 +87,20 @@ def encode_video(frames: Iterable[RGB], rate: float, ending: str) -> bytes:
     everything = chain([first], coming)
     if ending in CODECS:
         return _filmed(everything, first.shape, rate, ending)
-    return _pictured(everything, rate, ending)
+    return _pictured(everything, rate, ending, alpha)
 
 
 def _filmed(frames: Iterable[RGB], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:  # OpenCV writes to names only
         path, count = Path(folder) / f"video{ending}", 0
-        code, size = cv2.VideoWriter.fourcc(*CODECS[ending]), (shape[1], shape[0])
+        height, width = (side - side % 2 for side in shape[:2])  # colours have half of them
+        code, size = cv2.VideoWriter.fourcc(*CODECS[ending]), (width, height)
         with logged_output("a video"):  # FFmpeg's words about its tags, and about a full disk
             writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate, size)
             if not writer.isOpened():
                 raise VideoError(f"OpenCV has no encoder for {ending} here; choose .webp or .gif")
             for frame in frames:
-                writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+                writer.write(cv2.cvtColor(frame[:height, :width], cv2.COLOR_RGB2BGR))
                 count += 1
             writer.release()
         if _frames_in(path) != count:  # the encoder itself says nothing of what fails
@@ -116,29 +122,47 @@ def _frames_in(path: Path) -> int:
     return count
 
 
-def _pictured(frames: Iterable[RGB], rate: float, ending: str) -> bytes:
+def _pictured(frames: Iterable[RGB], rate: float, ending: str, alpha: U8 | None) -> bytes:
     out = io.BytesIO()
     if ending == ".webp":
-        images: Iterator[Image.Image] = map(Image.fromarray, frames)
+        seen = frames if alpha is None else (np.dstack([frame, alpha]) for frame in frames)
+        images: Iterator[Image.Image] = map(Image.fromarray, seen)
         first = next(images)
         first.save(out, "WEBP", save_all=True, append_images=images, loop=0,
-                   duration=round(1000 / rate), quality=WEBP_QUALITY, method=2)  # fmt: skip
+                   duration=_lasting(rate, 1), quality=WEBP_QUALITY, method=2)  # fmt: skip
         return out.getvalue()
-    images = map(_palettes(), frames)
+    images = map(_palettes(alpha), frames)
     first = next(images)
-    lasting = max(round(1000 / rate / GIF_TICK), 2) * GIF_TICK  # browsers slow down shorter ones
-    first.save(out, "GIF", save_all=True, append_images=images, loop=0, duration=lasting)
+    clear = {} if alpha is None else {"transparency": CLEAR, "disposal": 2}
+    first.save(
+        out, "GIF", save_all=True, append_images=images, loop=0,
+        duration=_lasting(rate, GIF_TICK), **clear,
+    )  # fmt: skip
     return out.getvalue()
 
 
-def _palettes() -> Callable[[RGB], Image.Image]:
+def _lasting(rate: float, tick: int) -> list[int]:
+    """How long each frame is shown, in whole ticks of `tick` ms: what is left over adds up.
+
+    Browsers slow a GIF down whose frames last less than two.
+    """
+    ends = np.rint(np.arange(MOST_FRAMES + 1) * (1000 / rate / tick))
+    return [int(tick * max(ticks, 2 if tick > 1 else 1)) for ticks in np.diff(ends)]
+
+
+def _palettes(alpha: U8 | None) -> Callable[[RGB], Image.Image]:
     """Makes pictures of 256 colours, which are the first frame's for all: nothing flickers."""
     palette: list[Image.Image] = []
+    is_clear = None if alpha is None else at_most(alpha, GIF_LONGEST) < 128
+    count = 256 if alpha is None else CLEAR
 
     def reduced(frame: RGB) -> Image.Image:
         image = Image.fromarray(at_most(frame, GIF_LONGEST))
         if not palette:
-            palette.append(image.quantize(256, Image.Quantize.MEDIANCUT))
-        return image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)
+            palette.append(image.quantize(count, Image.Quantize.MEDIANCUT))
+        made = image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)
+        if is_clear is not None:
+            made.paste(CLEAR, mask=Image.fromarray(is_clear))
+        return made
 
     return reduced

@@ -98,13 +98,20 @@ class RestSplats:
 
     def recoloured(self, colors: np.ndarray) -> RestSplats:
         """Return the same object in own `colors` (N, 3); it shows the photo as it did."""
-        other = copy.copy(self)
         gaussians = replace(self.lifted.gaussians, colors=np.asarray(colors, np.float32))
-        other.lifted = replace(self.lifted, gaussians=gaussians)
+        return self.changed_to(replace(self.lifted, gaussians=gaussians))
+
+    def changed_to(self, lifted: LiftedObject) -> RestSplats:
+        """Return the object as `lifted`, which differs in own colours and visibility only."""
+        other = copy.copy(self)
+        other.lifted = lifted
+        other.__dict__.pop("is_textured", None)
         blocks = self.blocks.copy()
-        table = np.zeros((blocks.shape[0] * LANES, 3), np.float32)
-        table[: len(self)] = gaussians.colors
-        blocks[:, COLOUR:] = table.reshape(-1, LANES, 3).transpose(0, 2, 1)
+        table = np.zeros((blocks.shape[0] * LANES, 4), np.float32)
+        table[: len(self), :3] = lifted.gaussians.colors
+        table[: len(self), 3] = lifted.texture.visibility
+        rows = table.reshape(-1, LANES, 4).transpose(0, 2, 1)
+        blocks[:, COLOUR:], blocks[:, VISIBILITY] = rows[:, :3], rows[:, 3]
         other.blocks = frozen(blocks)
         return other
 

@@ -64,7 +64,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     ridge = RULES.ridge * np.trace(screen, axis1=1, axis2=2) + 1e-12
     inverse = np.linalg.inv(screen + ridge[:, None, None] * np.eye(2))
     seen = texture.visibility[index].astype(np.float64)
-    cosine = _cosines(rest.normals[index], motion, means)
+    cosine = moved_cosines(rest.normals[index], motion, means)
     pictures, look, zoomed = rest.pictures[index], texture.u0[index], rest.zoom[index]
     aside = np.zeros(len(index), bool)
     if rest.sides is not None:  # where an invented picture shows the surface better
@@ -150,7 +150,7 @@ def _flattened(means: F64, photo_camera: Camera, kind: Splatting) -> F64:
     return np.concatenate([sides * means[:, 2:], means[:, 2:]], axis=1)
 
 
-def _cosines(normals: F64, motion: F64, means: F64) -> F64:
+def moved_cosines(normals: F64, motion: F64, means: F64) -> F64:
     """(N,) of the moved normals with the directions to the camera. Normals move by cofactors."""
     cofactor = np.stack(
         [np.cross(motion[:, (k + 1) % 3], motion[:, (k + 2) % 3]) for k in range(3)], axis=1

@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, RGB, Mask
+from ..base.arrays import F32, RGB, U8, Mask
 from ..base.camera import Camera
 from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
@@ -30,6 +30,7 @@ from ..document.paint import Paint
 from ..document.placement import gimbal_of
 from ..document.settings import AS_IN_THE_PHOTO, Refined
 from ..pictures.image import to_u8
+from ..pictures.video import MOST_FRAMES
 
 Box = tuple[int, int, int, int]
 
@@ -114,7 +115,7 @@ def _matte(matte: Matte, times: int) -> Matte:
         own[..., :3] /= np.maximum(own[..., 3:], 1e-6)
         levels = np.rint(255 * own).astype(np.uint8)
         height, width = small.shape
-        paint = Paint((), matte.paint.spots)
+        paint = Paint((), matte.paint.spots, matte.paint.apart)
         paint = paint.with_pixels((left, top, left + width, top + height), levels)
     return Matte(left, top, small, straight, paint)
 
@@ -181,7 +182,6 @@ MOTIONS = ("morph", "sway", "turn", "keys")
 SWAY = 30.0  # degrees to both sides
 HOLD = 0.15  # x the length of a morph, for which photo and edit are each shown at rest
 LONGEST = 1280  # px, longer side of a frame
-MOST_FRAMES = 3000
 TOLERANCE = 1e-3  # of a solve between two frames
 
 
@@ -209,11 +209,11 @@ class Clip:
 
 
 def frames(document: Document, clip: Clip, progress: Progress = silent) -> Iterator[RGB]:
-    """The clip's pictures (h, w, 3), all of one size, even in width and height.
+    """The clip's pictures (h, w, 3), all of one size.
 
     Played again and again the clip has no jump. Raises ValueError where nothing moves.
     """
-    times = max(-(-max(document.photo.size) // clip.longest), 1)
+    times = _times(document, clip)
     keys: list[Document] = []
     if clip.motion == "keys":
         keys = [shrunk(at_key(document, n), times) for n in range(count_keys(document))]
@@ -235,8 +235,23 @@ def frames(document: Document, clip: Clip, progress: Progress = silent) -> Itera
             pixels = film.drawn(film.keyed(time))
         else:
             pixels = film.drawn(film.turned(turning or 0, _yaw_at(time, clip.motion)))
-        height, width = (side - side % 2 for side in pixels.shape[:2])
-        yield np.ascontiguousarray(pixels[:height, :width])
+        yield np.ascontiguousarray(pixels)
+
+
+def frames_alpha(document: Document, clip: Clip) -> U8 | None:
+    """(h, w) the photo's alpha channel for each of the clip's pictures; None where it has none."""
+    alpha = document.photo.picture.alpha
+    if alpha is None:
+        return None
+    levels = np.asarray(to_u8(alpha), np.float32)
+    times = _times(document, clip)
+    height, width = (side // times * times for side in levels.shape)
+    return np.rint(_means(levels[:height, :width], times)).astype(np.uint8)
+
+
+def _times(document: Document, clip: Clip) -> int:
+    """How often smaller than the photo the clip's pictures are."""
+    return max(-(-max(document.photo.size) // clip.longest), 1)
 
 
 def _turning(document: Document, wanted: int | None) -> int | None:

@@ -26,7 +26,7 @@ from ..pictures.video import encode_video
 from ..pipeline import Edited, export
 from ..raster import tiles
 from ..splat_files import encode as encode_splats
-from .animation import Clip, frames
+from .animation import Clip, frames, frames_alpha
 from .options import ScriptError
 
 # The distance of the lifted objects as a picture for other programs.
@@ -134,7 +134,8 @@ class Export:
             write = encode_psd if format_of(path.name) is Format.PSD else encode_openraster
             return write(pile, merged)
         if what == "video":
-            return encode_video(self._film(), self.clip.rate, path.suffix)
+            alpha = frames_alpha(self.document, self.clip)
+            return encode_video(self._film(), self.clip.rate, path.suffix, alpha)
         if what in ("splats", "mesh"):
             return self._solid(what, path)
         return self._encoded(self.picture(what), path.suffix)
@@ -164,11 +165,11 @@ class Export:
         """
         if what == "layers":
             return self._layer_files(folder)
-        stem = Path(self.document.photo.name).stem
+        stem, alpha = Path(self.document.photo.name).stem, frames_alpha(self.document, self.clip)
         if (old := _frames_beyond(folder, stem, self.clip.count)) is not None:
             raise ScriptError(f"{old} is of a longer video; choose another folder, or empty it")
         return {
-            folder / f"{stem}-{n:04d}.png": encode_picture(Picture(frame), ".png")
+            folder / f"{stem}-{n:04d}.png": encode_picture(Picture(frame, alpha), ".png")
             for n, frame in enumerate(self._film())
         }
 

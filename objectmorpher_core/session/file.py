@@ -369,7 +369,10 @@ def _check_paint(item: EditObject) -> None:
         return
     if item.lifted is None:
         raise ValueError("an object that is not lifted is painted")
-    _same("paint on Gaussians", paint.spots.shape, (len(item.lifted.gaussians), 4))
+    count = len(item.lifted.gaussians)
+    _same("paint on Gaussians", paint.spots.shape, (count, 4))
+    if paint.apart is not None:
+        _same("paint apart", paint.apart.shape, (count,))
     for tile in paint.tiles:
         _same("paint", tile.rgba.shape, (SIDE, SIDE, 4))
         if max(abs(tile.left), abs(tile.top)) > MOST_TEXTURE or tile.left % SIDE or tile.top % SIDE:

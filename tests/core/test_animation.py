@@ -6,11 +6,12 @@ import io
 from dataclasses import replace
 from functools import cache
 from itertools import islice
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import edits
@@ -27,9 +28,22 @@ from objectmorpher_core.document.placement import spun
 from objectmorpher_core.document.pose import Pose
 from objectmorpher_core.document.settings import AS_IN_THE_PHOTO, Refined, Shadow
 from objectmorpher_core.document.visitor_edits import departing, with_visitor
-from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
+from objectmorpher_core.pictures.video import (
+    ENDINGS,
+    PICTURES,
+    VideoError,
+    encode_video,
+    read_frames,
+)
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.scripting.animation import Clip, frames, share_at, shrunk, station_at
+from objectmorpher_core.scripting.animation import (
+    Clip,
+    frames,
+    frames_alpha,
+    share_at,
+    shrunk,
+    station_at,
+)
 from objectmorpher_core.scripting.options import script_from
 from objectmorpher_core.scripting.outputs import Export
 from objectmorpher_core.session.file import decode_session, encode_session
@@ -378,3 +392,57 @@ def test_a_smaller_photo_is_refined_and_blurred_as_the_whole_one(times):
             expected, small.photo.pixels
         )
     assert small.objects[0].finish.blur == 9.0 / times
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_an_odd_size_stays_where_the_format_has_it(ending: str, tmp_path: Path):
+    sent = [frame[:101, :151] for frame in drifting(3)]
+    path = tmp_path / f"clip{ending}"
+    path.write_bytes(encode_video(iter(sent), 20.0, ending))
+    if ending in PICTURES:
+        with Image.open(path) as image:
+            assert image.size == (151, 101)
+        return
+    height, width = read_frames(path, (0,))[0].shape[:2]
+    assert (width, height) == (150, 100)
+
+
+@pytest.mark.parametrize("ending", PICTURES)
+@pytest.mark.parametrize("rate", [12.0, 24.0, 25.0, 30.0])
+def test_a_clip_lasts_as_long_as_its_frames(ending: str, rate: float):
+    sent = drifting(24)
+    with Image.open(io.BytesIO(encode_video(iter(sent), rate, ending))) as image:
+        lasting = 0
+        for frame in ImageSequence.Iterator(image):
+            frame.load()
+            lasting += frame.info["duration"]
+    assert lasting == pytest.approx(1000 * len(sent) / rate, abs=5)
+
+
+@pytest.mark.parametrize("ending", PICTURES)
+def test_what_the_photo_does_not_show_is_in_no_frame(ending: str):
+    sent, clear = drifting(4), np.s_[:30, :40]
+    alpha = np.full(sent[0].shape[:2], 255, np.uint8)
+    alpha[clear] = 0
+    data = encode_video(iter(sent), 20.0, ending, alpha)
+    with Image.open(io.BytesIO(data)) as image:
+        assert image.n_frames == len(sent)
+        for frame, before in zip(ImageSequence.Iterator(image), sent, strict=True):
+            found = np.asarray(frame.convert("RGBA"))
+            assert np.array_equal(found[..., 3], alpha)
+            there = alpha > 0
+            assert np.abs(found[there][:, :3].astype(int) - before[there]).mean() < 8
+
+
+def test_the_alpha_of_a_clip_is_the_photos_as_small_as_its_frames():
+    document = edited()
+    height, width = document.photo.pixels.shape[:2]
+    alpha = np.zeros((height, width), np.uint8)
+    alpha[: height // 2] = 255
+    photo = replace(document.photo, picture=replace(document.photo.picture, alpha=alpha))
+    document = replace(document, photo=photo)
+    clip = Clip(seconds=0.2, longest=(max(width, height) + 1) // 2)
+    (first, *_), small = list(frames(document, clip)), frames_alpha(document, clip)
+    assert small is not None and small.shape == first.shape[:2] == (height // 2, width // 2)
+    assert set(np.unique(small)) == {0, 255}
+    assert frames_alpha(edited(), clip) is None

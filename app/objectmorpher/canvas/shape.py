@@ -77,7 +77,7 @@ class CanvasShape:
             puppet = puppet.with_rig(thing.rig)
         if thing.matte is not None and thing.matte is not matte:
             if thing.shown is not None and thing.matte.paint is not matte.paint:
-                puppet = puppet.recoloured(thing.shown)
+                puppet = puppet.painted_as(thing.shown)
             texture, matte = object_texture(thing.matte, thing.lifted), thing.matte
         is_ready = self.is_rehearsed and puppet is self.puppet
         other = CanvasShape(puppet, texture, thing.rig, matte, is_ready)

@@ -27,6 +27,7 @@ from objectmorpher_core.scripting.script import (
 )
 
 from .commands import check_outputs, edited_by, json_bytes
+from .idle import refuse_idle, said_on
 from .ray import check_ray
 from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
@@ -50,6 +51,7 @@ class Task:
 
 def run_batch(options: argparse.Namespace) -> None:
     """`objectmorpher batch`. Raises RuntimeError at the end where an edit has failed."""
+    refuse_idle("batch", said_on(options, options.parser))
     if options.report:
         scripts = [path for path in _files(options.scripts, (".json",)) if not _is_report(path)]
         check_outputs(scripts, {options.report: (".json",)})
@@ -59,6 +61,7 @@ def run_batch(options: argparse.Namespace) -> None:
     tasks = list(_tasks(options))
     if not tasks:
         raise UsageError("there is no script to run")
+    _refuse_unused(tasks, options)
     if options.out is not None:
         make_folder(options.out)
     entries: dict[int, dict[str, Any]] = {}
@@ -66,6 +69,16 @@ def run_batch(options: argparse.Namespace) -> None:
         entries[number] = entry
         _say(entry)
     _finish([entries[number] for number in sorted(entries)], options.report)
+
+
+def _refuse_unused(tasks: list[Task], options: argparse.Namespace) -> None:
+    """Raises UsageError where photos are given that no script has a use for."""
+    items = [task.item for task in tasks]
+    if None in items:  # a script that cannot be read might have had
+        return
+    photos = {str(photo) for photo in _files(options.photo or [], READ_ENDINGS)}
+    if photos and not any(item and item.photo in photos for item in items):
+        raise UsageError('--photo has no effect: every script names its own "photo"')
 
 
 def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:

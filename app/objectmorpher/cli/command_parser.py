@@ -36,13 +36,14 @@ class Subcommand:
 def add_subcommands(
     parser: argparse.ArgumentParser, dest: str, subcommands: Sequence[Subcommand]
 ) -> None:
-    """Add subcommands, one of which is required: `dest` receives its name, `run` its function."""
+    """Add subcommands, one of which is required: `dest` receives its name, `run` its function,
+    `parser` what has read its options."""
     words = parser.add_subparsers(dest=dest, required=True, parser_class=type(parser))
     for subcommand in subcommands:
         word = words.add_parser(subcommand.name, help=subcommand.help)
         subcommand.add_options(word)
         if subcommand.run is not None:
-            word.set_defaults(run=subcommand.run)
+            word.set_defaults(run=subcommand.run, parser=word)
 
 
 def lazily(module: str, function: str, package: str = HERE) -> Callable[[Any], None]:

@@ -19,7 +19,13 @@ from objectmorpher_core.pictures.image import ENDINGS, encode_mask, encode_pictu
 from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.scripting.animation import Clip
-from objectmorpher_core.scripting.options import EditScript, ScriptError, files_of, script_from
+from objectmorpher_core.scripting.options import (
+    EditScript,
+    ScriptError,
+    files_of,
+    said_by,
+    script_from,
+)
 from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, Export, encode_output
 from objectmorpher_core.scripting.report import provenance
 from objectmorpher_core.scripting.runner import refuse_missing
@@ -31,6 +37,7 @@ from objectmorpher_core.splat_files.meshes.textured import plain_glb
 from .. import __version__
 from ..system.logs import log_path
 from ..system.report import without_names
+from .idle import refuse_idle, said_on
 from .terminal import PROGRAM, UsageError, progress_bar
 
 # `objectmorpher doctor`: what each stage would use on this machine, and what would help.
@@ -98,6 +105,7 @@ EXTRAS = {  # further outputs of `edit` and what each holds
     "save_video": "video",
     "report": "report",
 }
+USUAL_LENGTH = 4.0  # seconds of a video
 LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
 
@@ -110,7 +118,8 @@ def run_edit(options: argparse.Namespace) -> None:
     inputs = [Path(name) for name in (*(i.photo for i in items), *named, options.script) if name]
     outputs: dict[Path, bytes] = {}
     lines: list[str] = []
-    clip = Clip(options.video, options.seconds)
+    clip = _clip(options)
+    notes: tuple[str, ...] = ()
     for item in items:
         out = Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
@@ -122,10 +131,14 @@ def run_edit(options: argparse.Namespace) -> None:
         everything = [*outputs, out, *extras.values()]
         _check_distinct(everything)
         refuse_missing(item.script, item.others)
+        if len(items) == 1:
+            said = {**said_by(item.script), "objects": item.others.objects}
+            notes = refuse_idle("edit", said | said_on(options, options.parser))
         written, line = _edit_one(item, extras, clip)
         outputs |= written
         lines.append(line)
     write_all(outputs)
+    sys.stderr.write("".join(f"{PROGRAM}: {note}\n" for note in notes))
     sys.stdout.write("".join(f"{line}\n" for line in lines))
 
 
@@ -188,6 +201,12 @@ def _check_folder(path: Path) -> None:
         raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
 
 
+def _clip(options: argparse.Namespace) -> Clip:
+    """The video that is asked for."""
+    length = USUAL_LENGTH if options.seconds is None else options.seconds
+    return Clip(options.video or "morph", length)
+
+
 def _endings(what: str) -> tuple[str, ...]:
     return (".json",) if what == "report" else OUTPUTS[what]
 
@@ -214,7 +233,8 @@ def run_replay(options: argparse.Namespace) -> None:
     further = (options.report, options.save_handles, options.save_mesh, options.save_session)
     kinds = ((".json",), (".json",), OUTPUTS["mesh"], (".omorph",))
     wanted |= {path: kind for path, kind in zip(further, kinds, strict=True) if path}
-    video, clip = options.save_video, Clip(options.video, options.seconds)
+    refuse_idle("replay", said_on(options, options.parser))
+    video, clip = options.save_video, _clip(options)
     if video and _is_folder("save_video", video):
         _check_folder(video)
     elif video:
@@ -290,6 +310,7 @@ def describe(document: Document) -> dict[str, Any]:
 
 def run_convert(options: argparse.Namespace) -> None:
     """`objectmorpher convert`"""
+    refuse_idle("convert", said_on(options, options.parser))
     count = COUNT if options.count is None else options.count
     if not LEAST_COUNT <= count <= MOST_COUNT:
         raise UsageError(f"--count must be from {LEAST_COUNT} to {MOST_COUNT:,}, not {count:,}")

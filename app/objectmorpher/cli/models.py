@@ -12,6 +12,7 @@ from objectmorpher_core import lift, model_sets, models
 from objectmorpher_core.lift.workers import file as worker_file
 from objectmorpher_core.models import Added, CacheState, HubModel, HubState, TrunkState
 
+from .idle import refuse_idle, said_on
 from .terminal import UsageError, progress_bar
 
 WIDE, NARROW = 34, 12  # characters of the list's columns
@@ -26,6 +27,7 @@ def run_models(options: argparse.Namespace) -> None:
             "a file is added as in: objectmorpher models add depth FILE.onnx, and a folder as in:"
             " objectmorpher models add sam2 FOLDER"
         )
+    refuse_idle("models", said_on(options, options.parser))
     if options.is_offline:
         os.environ[models.OFFLINE] = "1"
     if action == "setup":

@@ -31,7 +31,7 @@ from .command_parser import (
 )
 from .options import RENDERERS, WindowOptions
 from .ray import add_ray
-from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
+from .terminal import FAILURES, PROGRAM, UsageError, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED = 1  # exit code
@@ -122,7 +122,26 @@ def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
     if wrong is not None:
         sys.stderr.write(f"{PROGRAM}: {wrong}\n")
         raise SystemExit(MISUSED)
-    return window_parser().parse_args(list(arguments))
+    parser = window_parser()
+    options = parser.parse_args(list(arguments))
+    options.parser = parser
+    return options
+
+
+def idle_in_window(options: argparse.Namespace, has_display: bool) -> str | None:
+    """Return what on the command line of the window would have no effect: one sentence, or None."""
+    from .idle import refuse_idle, said_on
+
+    said = said_on(options, options.parser)
+    if not has_display and len(options.files) > 1:
+        return "without a display one photo is edited at a time: objectmorpher batch does many"
+    try:
+        refuse_idle("window", said)
+        if not has_display:
+            refuse_idle("window without a display", said)
+    except UsageError as error:
+        return str(error)
+    return None
 
 
 def window_options(options: argparse.Namespace) -> WindowOptions:
@@ -232,9 +251,9 @@ def _add_select(parser: argparse.ArgumentParser) -> None:
 def _add_video(add: Callable[..., object]) -> None:
     add("--save-video", type=Path, metavar="FILE",
         help="as .webm, .mp4, .gif or .webp; without an ending, a folder of PNG files")  # fmt: skip
-    add("--video", metavar="KIND", default="morph",
+    add("--video", metavar="KIND",
         help="morph (photo to edit and back, the default), sway, turn or keys")  # fmt: skip
-    add("--seconds", type=float, default=4.0, metavar="S", help="length of the video, default 4")
+    add("--seconds", type=float, metavar="S", help="length of the video, default 4")
 
 
 def _add_replay(parser: argparse.ArgumentParser) -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from .idle import refuse_idle, said_on
 from .terminal import UsageError
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ def run_serve(options: argparse.Namespace) -> None:
         raise UsageError("--gpus is a number of GPUs, or a share of one")
     if options.store is not None and options.store < 1:
         raise UsageError("--store is a number of MB above zero")
+    refuse_idle("serve", said_on(options, options.parser))
     token, is_new = _token(options.token_file)
     if not options.alone and find_spec("ray") is None:
         raise UsageError("Ray is not installed: `pip install 'objectmorpher[cluster]'`, or --alone")
@@ -91,17 +93,12 @@ def run_serve(options: argparse.Namespace) -> None:
         _greet(front.url, token if is_new else None, options)
 
 
-OF_CLUSTERS = ("ray", "stages", "gpus", "store")
-
-
 def _run_web(options: argparse.Namespace) -> None:
     """Serves the editor to browsers until it is interrupted or ended."""
     from ..server.web_editor import WebServer
     from ..system.logs import show_log
 
-    meant = [name for name in OF_CLUSTERS if getattr(options, name) is not None]
-    if meant or options.replicas != "1":
-        raise UsageError(f"--web computes in this process: leave out --{(*meant, 'replicas')[0]}")
+    refuse_idle("serve", said_on(options, options.parser))
     _check_address(options)
     token, is_new = _token(options.token_file)
     show_log()

@@ -29,8 +29,8 @@ LAYERED: Columns = (
     *PLAIN, ("p_depth", "4f"), ("p_shift", "4f"), ("p_slope", "4f"), ("p_edge", "3f"),
 )  # fmt: skip
 
-GEOMETRY = (("place", "4f"), ("quat", "4f"), ("size", "4f"), ("normal", "4f"), ("look", "3f"))
-PAINT = (("paint", "4f"),)
+GEOMETRY = (("place", "4f"), ("quat", "4f"), ("size", "4f"), ("normal", "3f"), ("look", "3f"))
+PAINT = (("paint", "4f"), ("visibility", "1f"))
 SIDES = (("side0", "3f"), ("side1", "3f"), ("aside", "3f"))
 NODES = (("control_points", "4i"),)
 SHARES = tuple((f"share{c}", "4f") for c in range(4))
@@ -90,7 +90,7 @@ class ProjectPass:
         return self._programs[key]
 
     def _rest(self, program: moderngl.Program, rest: RestSplats, photo: Camera) -> list[Any]:
-        """What does not depend on the motion. A painted object shares all but its colours."""
+        """What does not depend on the motion. Paint changes none of it but its own."""
         uploads, buffer = self._uploads, self._context.buffer
         geometry = uploads("geometry", rest.means, lambda: buffer(_table_geometry(rest, photo)))
         paint = uploads("paint", rest, lambda: buffer(_table_paint(rest)))
@@ -141,13 +141,13 @@ def _columns(matrix: np.ndarray) -> tuple[float, ...]:
 
 
 def _table_geometry(rest: RestSplats, photo_camera: Camera) -> F32:
-    """(N, 19), see GEOMETRY."""
+    """(N, 18), see GEOMETRY."""
     gaussians, texture = rest.lifted.gaussians, rest.lifted.texture
     seen_at = photo_camera.project(rest.lifted.world_points(rest.means))
     return np.column_stack(
         [
             rest.means, gaussians.opacities, gaussians.quats, gaussians.scales, rest.cosines,
-            gaussians.normals, texture.visibility, texture.u0 - seen_at, texture.solidity,
+            gaussians.normals, texture.u0 - seen_at, texture.solidity,
         ]
     ).astype(np.float32)  # fmt: skip
 
@@ -163,8 +163,9 @@ def _table_sides(rest: RestSplats, photo_camera: Camera) -> F32:
 
 
 def _table_paint(rest: RestSplats) -> F32:
-    """(N, 4), see PAINT."""
-    return np.column_stack([rest.lifted.gaussians.colors, rest.zoom]).astype(np.float32)
+    """(N, 5), see PAINT."""
+    colors, visibility = rest.lifted.gaussians.colors, rest.lifted.texture.visibility
+    return np.column_stack([colors, rest.zoom, visibility]).astype(np.float32)
 
 
 def _table_shares(binding: Binding) -> F32:

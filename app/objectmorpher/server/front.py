@@ -50,6 +50,7 @@ PIECE = 1 << 20  # bytes read at a time
 MOST_DIGITS = 18  # of a length that is announced
 POLL = 0.1  # s until `close` is noticed
 NOTHING = "there is nothing of that name"
+FAILED = "the computer that serves this has failed"
 
 
 class HttpServer:
@@ -159,6 +160,7 @@ class Handler(BaseHTTPRequestHandler):
     server_version = "objectmorpher"
     sys_version = ""
     more_headers: ClassVar[Mapping[str, str]] = {}  # of every answer
+    has_begun = False  # to send an answer
 
     def log_message(self, format: str, *args: Any) -> None:
         log.debug(format, *args)
@@ -194,6 +196,12 @@ class Handler(BaseHTTPRequestHandler):
         except Refusal as refusal:
             log.info("Refused %r: %s", self.path[:80], refusal)
             self.send_json(refusal.status, refusal.answer)
+        except OSError:  # nobody listens any more
+            raise
+        except Exception:
+            log.exception("%r cannot be answered", self.path[:80])
+            if not self.has_begun:
+                self.send_json(HTTPStatus.INTERNAL_SERVER_ERROR, {"error": FAILED})
 
     def read_body(self, most: int) -> bytes:
         """Read as many bytes as were announced, at most `most`. Raises Refusal."""
@@ -219,6 +227,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def send_head(self, status: HTTPStatus, kind: str, headers: Mapping[str, str]) -> None:
         """Status line and headers; without a length what follows ends with the connection."""
+        self.has_begun = True
         self.send_response(status)
         for name, value in self.head(kind, headers).items():
             self.send_header(name, value)

@@ -8,7 +8,7 @@
     POST /web/edits/ID/lift              {}
     POST /web/edits/ID/render            {"what": one of FILES, "points", "quats", "turn", "shift"}:
                                          the state of the page of `objectmorpher share`
-    GET  /web/edits/ID/about             {"id", "size"}
+    GET  /web/edits/ID/about             {"id", "size", "is_chosen", "is_lifted"}
     GET  /web/edits/ID/photo|mask|page   pictures, and that page
     GET  /web/edits/ID/files/WHAT        what was rendered last
 
@@ -37,6 +37,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from objectmorpher_core import pipeline, segment
+from objectmorpher_core.base import quoting
 from objectmorpher_core.base.limits import CONNECTIONS
 from objectmorpher_core.base.progress import Cancelled, Progress, part
 from objectmorpher_core.base.rotations import matrices_from_quats
@@ -59,7 +60,7 @@ from objectmorpher_core.session.file import encode_session
 
 from ..system.resources import resource
 from .address import check_token
-from .front import NOTHING, Handler, HttpServer, Kept, Refusal
+from .front import FAILED, NOTHING, Handler, HttpServer, Kept, Refusal
 from .share_page import LONGEST, encode_page
 
 log = logging.getLogger(__name__)
@@ -70,6 +71,11 @@ MOST_CLICKS = 64
 BEAT = 0.2  # s between two lines of a computation
 QUALITY = 90  # of the WebP that the page shows while one selects
 FILES = ("photo", "session", "layers")
+QUESTIONS = {  # what may be asked, and what a question of it holds
+    "select": {"click", "not_click", "subject"},
+    "lift": set[str](),
+    "render": {"what", "points", "quats", "turn", "shift"},
+}
 KEPT_ENDINGS = (".jpg", ".jpeg", ".png")  # a photo is given back as what it came; else PNG
 # The page runs the page of `share` in a frame of its own, which brings its programs along.
 POLICY = (
@@ -102,8 +108,10 @@ class WebEdit:
                 for name, is_meant in (("click", True), ("not_click", False))
                 for x, y in _points(asked.get(name, []), self.opened.photo.size)
             ),
-            is_subject=asked.get("subject") is True,
+            is_subject=asked.get("subject", False),
         )
+        if not isinstance(wanted.is_subject, bool):
+            raise EditError("subject is true or false")
         if wanted.is_empty:
             raise EditError("click the object first")
         if self.reading is None:
@@ -189,12 +197,14 @@ def posed_as_shown(document: Document, shown: Mapping[str, Any]) -> Document:
     lengths = np.linalg.norm(quats, axis=1, keepdims=True)
     if lengths.min() < 0.5:
         raise EditError("the turns of a pose are unit quaternions")
+    turn, shift = _numbers(shown.get("turn")), _numbers(shown.get("shift"))
+    if turn is None or shift is None or (turn.size, shift.size) != (9, 3):
+        raise EditError("a place is a turn of 9 numbers and a shift of 3")
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = turn.reshape(3, 3), shift.ravel()
     try:
-        motion = np.eye(4)
-        motion[:3, :3] = np.array(shown["turn"], np.float64).reshape(3, 3)
-        motion[:3, 3] = np.array(shown["shift"], np.float64).reshape(3)
         place = placement_of(motion @ np.linalg.inv(lifted.world_from_object), lifted, camera)
-    except (KeyError, TypeError, ValueError) as error:
+    except ValueError as error:
         raise EditError(f"that is no place of an object: {error}") from error
     pose = Pose(points, matrices_from_quats(quats / lengths))
     return edits.set_placement(edits.set_pose(document, 0, pose), 0, place)
@@ -210,14 +220,31 @@ def _floats(shown: Mapping[str, Any], name: str, shape: tuple[int, int]) -> np.n
     return values.astype(np.float64)
 
 
-def _points(said: Any, size: tuple[int, int]) -> list[tuple[float, float]]:
+def _numbers(said: Any) -> np.ndarray | None:
+    """Numbers of JSON, in lists that are alike; None where they are something else."""
+    if not isinstance(said, list):
+        return None
     try:
-        points = np.array(said, np.float64).reshape(-1, 2)
-    except (TypeError, ValueError):
-        raise EditError("clicks are pairs of numbers") from None
+        values = np.array(said)
+        is_number = values.size == 0 or (values.dtype.kind in "if" and not _has_truths(said))
+        return values.astype(np.float64) if is_number else None
+    except (OverflowError, ValueError):
+        return None
+
+
+def _has_truths(said: Any) -> bool:
+    """Whether true or false is among them, which NumPy takes for numbers."""
+    return any(map(_has_truths, said)) if isinstance(said, list) else isinstance(said, bool)
+
+
+def _points(said: Any, size: tuple[int, int]) -> list[tuple[float, float]]:
+    points = _numbers(said)
+    if points is None or not (points.size == 0 or points.shape[1:] == (2,)):
+        raise EditError("clicks are pairs of numbers")
+    points = points.reshape(-1, 2)
     if len(points) > MOST_CLICKS:
         raise EditError(f"at most {MOST_CLICKS} clicks are taken")
-    if not ((points >= 0) & (points <= size)).all():
+    if not ((points >= 0) & (points < size)).all():
         raise EditError("a click is inside the photo")
     return [(float(x), float(y)) for x, y in points]
 
@@ -287,7 +314,10 @@ class _WebHandler(Handler):
             return
         edit, name, what = self._meant()
         if what == "about":
-            self.send_json(HTTPStatus.OK, {"id": name, "size": edit.opened.photo.size})
+            self.send_json(HTTPStatus.OK, {
+                "id": name, "size": edit.opened.photo.size,
+                "is_chosen": edit.chosen is not None, "is_lifted": edit.lifted is not None,
+            })  # fmt: skip
             return
         try:
             body, kind = edit.show(what)
@@ -313,10 +343,14 @@ class _WebHandler(Handler):
             raise Refusal(HTTPStatus.NOT_FOUND, NOTHING)
         try:
             asked = json.loads(self.read_body(MOST_SAID))
-        except ValueError:
+        except (ValueError, RecursionError):
             asked = None
         if not isinstance(asked, dict):
             raise Refusal(HTTPStatus.BAD_REQUEST, "a question is one object of JSON")
+        for key in sorted(asked.keys() - QUESTIONS[what]):
+            known = ", ".join(sorted(QUESTIONS[what])) or "nothing"
+            said = quoting.shown(key) + quoting.meant(key, QUESTIONS[what])
+            raise Refusal(HTTPStatus.BAD_REQUEST, f"{what} has no {said}; it may have {known}")
         self._carry_out(partial(work, asked))
 
     def _open(self) -> None:
@@ -350,7 +384,7 @@ class _WebHandler(Handler):
             self._line({"state": "failed", "error": str(error)})
         except Exception:
             log.exception("A computation failed")
-            self._line({"state": "failed", "error": "the computer that serves this has failed"})
+            self._line({"state": "failed", "error": FAILED})
 
     @contextmanager
     def _turn(self) -> Iterator[None]:

@@ -6,6 +6,7 @@ import base64
 import http.client
 import io
 import json
+import time
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from objectmorpher.cli.parser import main
 from objectmorpher.server.web_editor import MOST_EDITS, WebServer, posed_as_shown
 from objectmorpher_core.base.rotations import quats_from_matrices
 from objectmorpher_core.deform.puppet import puppet_of
@@ -87,14 +89,17 @@ def test_without_the_token_only_the_page_is_there(server: WebServer) -> None:
 def test_nonsense_is_answered_with_a_sentence_and_hurts_nobody(server: WebServer) -> None:
     assert ask(server, "POST", "/web/edits", b"no picture")[0] == 400
     edit = opened(server, (SAMPLES / "bowl.jpg").read_bytes())
-    for body in (b"", b"[]", b"{", b"\xff"):
-        assert ask(server, "POST", f"{edit}/select", body)[0] in (400, 411)
+    for body in (b"", b"[]", b"{", b"\xff", b"[" * 100_000, b'{"clicks": [[5, 5]]}'):
+        status, answer = ask(server, "POST", f"{edit}/select", body)
+        assert status in (400, 411) and json.loads(answer)["error"]
     for asked in (
         {}, {"click": [[1]]}, {"click": "here"}, {"click": [[-1, 5]]}, {"click": [[1e9, 5]]},
         {"click": [["a", "b"]]}, {"click": [[1, 1]] * 1000}, {"click": [[float("nan"), 1]]},
+        {"click": [["5", "6"]]}, {"click": [[True, 5]]}, {"click": [[10**400, 1]]},
+        {"click": [5, 5]}, {"click": {"x": 5}}, {"subject": "yes"}, {"click": None},
     ):  # fmt: skip
         told = last_line(server, f"{edit}/select", asked)
-        assert told["state"] == "failed" and told["error"]
+        assert told["state"] == "failed" and told["error"] and "failed" not in told["error"]
     assert last_line(server, f"{edit}/lift", {})["error"] == "click the object first"
     for what in ("mask", "page", "files/photo", "files/x", "elsewhere"):
         assert ask(server, "GET", f"{edit}/{what}")[0] == 404
@@ -143,6 +148,7 @@ def shown(count: int, **more: Any) -> dict[str, Any]:
     {"turn": [0] * 9}, {"turn": [1] * 8}, {"shift": ["a", 1, 2]},
     {"turn": [-1, 0, 0, 0, 1, 0, 0, 0, 1]}, {"turn": [2, 0, 0, 0, 1, 0, 0, 0, 1]},
     {"shift": [0, 0, float("nan")]}, {"shift": [0, 0, -1e5]}, {"quats": "*"},
+    {"shift": None}, {"turn": [10**400] * 9}, {"turn": {"a": 1}}, {"shift": ["1", "2", "3"]},
 ])  # fmt: skip
 def test_a_pose_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(EditError):
@@ -166,6 +172,32 @@ def test_the_pose_of_the_page_is_the_documents() -> None:
     np.testing.assert_allclose(turns, np.tile([1.0, 0, 0, 0], (len(rest), 1)), atol=1e-9)
     motion = posed.placement.matrix(lifted, scene().photo.camera)
     np.testing.assert_allclose(motion, np.eye(4), atol=1e-9)
+
+
+def test_an_edit_by_http_gives_the_very_pixels_of_the_command_line(
+    server: WebServer, tmp_path: Path
+) -> None:
+    source = SAMPLES / "bowl.jpg"
+    edit = opened(server, source.read_bytes())
+    assert last_line(server, f"{edit}/select", {"click": [[500, 340]]})["state"] == "done"
+    assert last_line(server, f"{edit}/lift", {})["state"] == "done"
+    document = server.find(edit.rpartition("/")[2]).lifted
+    assert document is not None
+    item, camera = document.objects[0], document.photo.camera
+    assert item.lifted is not None
+    rest = puppet_of(item, camera).deformer.points
+    motion = Placement(turn=(20.0, 0.0, 0.0)).matrix(item.lifted, camera)
+    motion = motion @ item.lifted.world_from_object
+    question = {
+        "what": "photo", "points": base64.b64encode(rest.astype("<f4").tobytes()).decode(),
+        "quats": base64.b64encode(np.tile([1, 0, 0, 0], (len(rest), 1)).astype("<f4")).decode(),
+        "turn": motion[:3, :3].ravel().tolist(), "shift": motion[:3, 3].tolist(),
+    }  # fmt: skip
+    assert last_line(server, f"{edit}/render", question)["state"] == "done"
+    made = ask(server, "GET", f"{edit}/files/photo")[1]
+    out = tmp_path / "out.png"
+    assert main(["edit", str(source), "--click", "500,340", "--turn", "20", "-o", str(out)]) == 0
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(made))), np.asarray(Image.open(out)))
 
 
 # ---- with a browser ---------------------------------------------------------------------------
@@ -215,3 +247,95 @@ def test_a_visitor_opens_clicks_lifts_turns_and_saves(server: WebServer) -> None
     assert edited.shape == photo.shape and 0.02 < changed.mean() < 0.6
     item = decode_session(files["session"][1]).objects[0]
     np.testing.assert_allclose(item.placement.turn, (15, 0, 0), atol=1e-3)
+
+
+def choose(page: Browser, name: str) -> None:
+    page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+    page.run(f"document.querySelector('#samples img[alt={name}]').parentElement.click()")
+
+
+def select_middle(page: Browser) -> None:
+    place = screen_place(page, 0.5, 0.5)
+    page.drag(place, place)
+    page.wait("!document.getElementById('lift').disabled", "the selection")
+
+
+STEP = "document.body.dataset.step"
+# What is asked for waits so long, ms, by how its address ends; each is taken once.
+SLOWLY = """
+    const real = window.fetch, waits = %s;
+    window.fetch = async (path, options) => {
+      const end = Object.keys(waits).find((end) => String(path).endsWith(end));
+      const [ms] = end ? waits[end].splice(0, 1) : [0];
+      await new Promise((go) => setTimeout(go, ms || 0));
+      return real(path, options);
+    };
+"""
+
+
+@pytest.mark.slow
+def test_a_page_that_is_loaded_again_goes_on_with_its_edit(server: WebServer) -> None:
+    with opened_browser() as page:
+        page.open(f"{server.url}/#token={TOKEN}")
+        choose(page, "coffee")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        page.open(f"{server.url}/")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        select_middle(page)
+        page.open(f"{server.url}/")
+        page.wait("edit?.isChosen", "the selection")
+        page.run("document.getElementById('lift').click()")
+        page.wait(f"{STEP} === 'drag'", "lifting")
+        page.open(f"{server.url}/")
+        page.wait(f"{STEP} === 'drag'", "the object")
+        frame = "document.getElementById('frame').contentWindow"
+        page.wait(f"{frame}.objectmorpher && {frame}.objectmorpher.isStill", "drawing")
+        page.run("document.getElementById('other').click()")
+        page.wait(f"{STEP} === 'open'", "leaving")
+        page.open(f"{server.url}/")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        assert page.run(f"return {STEP}") == "open"
+        page.run("sessionStorage.setItem('edit', JSON.stringify({id: 'gone', isSent: false}))")
+        page.open(f"{server.url}/")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        assert page.run(f"return {STEP}") == "open"
+
+
+@pytest.mark.slow
+def test_what_arrives_late_does_not_replace_what_was_opened_or_left_since(
+    server: WebServer,
+) -> None:
+    with opened_browser() as page:
+        page.open(f"{server.url}/#token={TOKEN}")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        page.run(SLOWLY % "{'web/edits': [2500, 0], '/page': [2500]}")
+        choose(page, "coffee")
+        choose(page, "flower")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        shown = "[edit.size[0], document.getElementById('photo').naturalWidth]"
+        assert page.run(f"return {shown}") == [640, 640]
+        time.sleep(4)
+        assert page.run(f"return {shown}") == [640, 640], "the coffee came last"
+        select_middle(page)
+        page.run("document.getElementById('lift').click()")
+        page.wait("stop === null", "lifting")
+        page.run("document.getElementById('other').click()")
+        time.sleep(4)
+        assert page.run(f"return {STEP}") == "open"
+
+
+@pytest.mark.slow
+def test_in_a_narrow_window_nothing_lies_over_anything_else(server: WebServer) -> None:
+    with opened_browser() as page:
+        page.resize(400, 760)
+        page.open(f"{server.url}/#token={TOKEN}")
+        page.wait("document.querySelectorAll('#samples button').length > 3", "the samples")
+        below = "const b = (id) => document.getElementById(id).getBoundingClientRect();"
+        assert page.run(f"{below} return b('drop').bottom <= b('hint').top")
+        choose(page, "coffee")
+        page.wait(f"{STEP} === 'select'", "the photo")
+        select_middle(page)
+        page.run("document.getElementById('lift').click()")
+        page.wait(f"{STEP} === 'drag'", "lifting")
+        assert page.run("return document.documentElement.scrollWidth <= innerWidth")
+        assert page.run(f"{below} return b('frame').bottom <= b('hint').top")

@@ -8,24 +8,38 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from objectmorpher_core.base.brush import Brush, Stroke
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite, object_texture
 from objectmorpher_core.compose.paint import look, with_stroke, without_stroke
+from objectmorpher_core.compose.paint_owners import ShownSurface
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, LiftSettings, Matte, Placement
+from objectmorpher_core.document.model import (
+    Document,
+    EditObject,
+    LiftSettings,
+    Matte,
+    Photo,
+    Placement,
+)
 from objectmorpher_core.document.paint import SIDE
 from objectmorpher_core.lift.refitting import carried_over
+from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import lift_mask
+from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.scripting.animation import shrunk
 from objectmorpher_core.session.file import decode_session, encode_session
-from tests import shapes
+from tests import photos, shapes
 
 INK = np.array([0.1, 0.85, 0.2], np.float32)  # of which the made photo has nothing
 NEAR = 24  # levels, of a colour that is the ink's
 SEEN = 0.9  # of a stroke, at least
+BESIDE_OTHERS = 0.8  # of a stroke, at least, where the photo shows another surface beside it
+EITHER = 0.08  # of a stroke, by Gaussians that show both sides of an edge in the photo
 WITHIN = 4  # texels around a stroke, in which it may end
 PLACES = {
     "at rest": Placement(),
@@ -214,3 +228,81 @@ def test_a_small_video_shows_paint_as_the_edit_does():
         is_painted = np.abs(small.astype(int) - plain).max(-1) > 4 * NEAR
         assert is_painted.sum() > 100
         assert np.abs(small.astype(int) - large)[is_painted].mean() < NEAR / 3
+
+
+@cache
+def _cup() -> Document:
+    """The cup on its saucer, with a spoon that its rim hides in part."""
+    pixels, mask, shape = photos.photo("coffee"), photos.outlined("coffee"), LiftSettings(8000)
+    camera = Camera.from_fov(pixels.shape[1], pixels.shape[0])
+    photo = Photo(Picture(pixels), camera, shapes.png(pixels), "coffee.png")
+    lift = lift_mask(pixels, camera, mask, "relief", shape)
+    document = Document(photo, (EditObject("Cup", mask=mask),))
+    return edits.set_lifted(document, 0, *lift, shape)
+
+
+def _drawn(document: Document) -> tuple[np.ndarray, np.ndarray]:
+    """(h, w, 3) the object alone, premultiplied, and where (h, w, 3) its surface was at rest."""
+    item, camera = document.objects[0], document.photo.camera
+    assert item.matte is not None
+    splats, texture = _posed(document), object_texture(item.matte, item.lifted)
+    surface = ShownSurface.of(splats, texture, camera, camera, None)
+    shown = tiles.draw(tiles.prepare(splats, camera, camera), texture)
+    places = np.where(surface.is_there[..., None], surface.places, np.inf)
+    return shown.color, places
+
+
+def _inked(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(h, w) what has taken the ink's colour."""
+    way = INK - before
+    return ((after - before) * way).sum(-1) > 0.3 * (way * way).sum(-1)
+
+
+# px of the view: on the rim and the wall that comes into view below it; on the wall; its far edge;
+# the saucer behind; the spoon's end; the spoon's bowl
+@pytest.mark.parametrize(
+    "way",
+    [
+        ((300, 30), (315, 70)), ((340, 120), (340, 190)), ((366, 150), (375, 170)),
+        ((440, 85), (459, 92)), ((320, 310), (350, 280)),
+    ],
+)  # fmt: skip
+def test_of_a_side_that_came_into_view_only_what_lay_under_the_brush_is_coloured(way: tuple):
+    document = _placed(Placement(turn=(50.0, 0.0, 0.0)), _cup())
+    stroke = Stroke(document.photo.size, Brush(8.0, 1.0))
+    for x, y in way:
+        stroke.move_to(float(x), float(y))
+    painted = _painted(document, stroke)
+    lifted = document.objects[0].lifted
+    assert lifted is not None
+    under = _drawn(document)[1][_grown(stroke.coverage, WITHIN)]
+    tree = KDTree(under[np.isfinite(under).all(1)])
+    for yaw in (50.0, 25.0, 0.0, -40.0, 80.0):
+        here = Placement(turn=(yaw, 0.0, 0.0))
+        before, places = _drawn(_placed(here, document))
+        inked = _inked(before, _drawn(_placed(here, painted))[0])
+        away, _ = tree.query(np.where(np.isfinite(places), places, 1e6))
+        is_other = inked & (away > 4 * lifted.spacing)
+        most = EITHER * (stroke.coverage > 0).sum()
+        assert is_other.sum() < most, f"{yaw}: {is_other.sum()} px"
+        if yaw == 50.0:
+            is_there = np.isfinite(places).all(-1)
+            assert inked[(stroke.coverage >= 1) & is_there].mean() > BESIDE_OTHERS
+
+
+def test_an_edge_that_paint_sets_apart_is_kept_and_comes_back_when_it_is_erased():
+    document = _placed(Placement(turn=(50.0, 0.0, 0.0)), _cup())
+    stroke, wide = (Stroke(document.photo.size, Brush(radius, 1.0)) for radius in (8.0, 20.0))
+    for x, y in ((300, 30), (315, 70), (322, 80)):
+        stroke.move_to(float(x), float(y))
+        wide.move_to(float(x), float(y))
+    painted = _painted(document, stroke)
+    matte = painted.objects[0].matte
+    assert matte is not None and matte.paint is not None and matte.paint.apart is not None
+    again = decode_session(encode_session(painted)).objects[0].matte
+    assert again is not None and again.paint is not None
+    assert again.paint.apart is not None
+    assert np.array_equal(again.paint.apart, matte.paint.apart)
+    erased = _painted(painted, wide, is_erased=True)
+    assert np.array_equal(_drawn(erased)[0], _drawn(document)[0])
+    assert erased.objects[0].matte is not None and erased.objects[0].matte.paint is None
