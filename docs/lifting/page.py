@@ -105,8 +105,19 @@ ball loses 1.8 dB), to even the depth along the rim, to let the middle go on as 
 outline, four times as many Gaussians (the plate's wobble falls from 1.55 to 1.42 only), and to even
 corners as the rest of an outline (the box loses 0.3 dB). Another seed alone moves the ring by 0.1
 to 0.3 dB. Newly shown sides are [invented pictures](../concepts/photo-texture.md), which are never
-the true ones: on the ball they cost 0.3 dB against a plain colour, and take the flat share from
-0.17 to 0.05.
+the true ones: on the ball they cost 0.3 dB against a plain colour.
+
+Where such a picture is plainer than the object, texture is quilted over it, and what a soft edge
+mixes (fur lit from behind, hair, blur) is replaced from farther in: what is drawn out over a side
+when an object turns by 25 degrees is the outermost twentieth of it. Fourteen further photographs
+(animals, people, fruit, buildings; none of them is on a page here) were lifted by one click, turned
+by 25 and 35 degrees to both sides and by 20 up and down: streaks fell from 6.2 to 5.7 % of what is
+newly shown, and flat places from 8.6 to 6.0 %. Of the eight among them on which nothing was chosen
+streaks fell from 6.0 to 5.9 %, and flat places from 6.2 to 5.0 %. A quokka's side, lit from behind,
+was a pale band before; a lion's mane, a dog's ear and the peel of an orange were smooth. The
+solids, whose edges are crisp, lose 0.03 dB of a turn by 20 degrees and nothing of those held out.
+To change from the photo to the invented picture earlier, at a ratio of 0.55 instead of 0.4, lets an
+eye come twice. Quilts alone, without the completion beneath, break the stripes of a vase.
 
 ## Beyond the photo's frame
 
@@ -150,11 +161,11 @@ Each picture was looked at. The coffee spins on its table, which holds up to 35 
 cup's limb are jags, and a nib where the spoon touches the lip; its handle and spoon lie flat on the
 saucer. Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right, the
 astronaut nearly so: her head is a little deep, and what is not shown of her neck is uneven. The
-horse is a sheet, as it was drawn. What does not look right: the invented fur along the cat's cheek
-is a little darker than the fur beside it, and that at the upper left is coarse; the fig in the bowl
-becomes narrow, and slides at 35, where a strand stands off the bowl's edge; the photographer's back
-has a grey band; the clock, which is blurred, has a double edge, and the cell, which is blurred too,
-a hard one where its side turns into view; the colour ball is black on black at the frame, and has
+horse is a sheet, as it was drawn. What does not look right: the cat's fur at the upper
+left is coarse; the fig in the bowl becomes narrow, and slides at 35, where a strand stands off the
+bowl's edge; the photographer's back has a grey band; the clock, which is blurred, has a double
+edge, and the cell, which is blurred too, a hard one where its side turns into view; the retina
+shows its dark spot a second time at its left; the colour ball is black at the frame, and has bands,
 nicks and specks there; the pagoda leans, becomes narrow at 35, and shows light spots at its left
 windows; of the moon a piece of ground is selected, which has a ragged edge.
 """
