@@ -29,6 +29,9 @@ OTHER = 40.0  # levels, by which the coarse colours of something else differ: it
 NEARBY = 3.0  # px, over which they are compared
 FINE, AROUND = 2.0, 6.0  # px, of the contrast, and over which it is gathered
 ENOUGH = 0.8  # x the usual contrast, up to which a hole is plain; from twice as much on it is not
+# Contrast along the weakest direction over that across it: of stripes at most 0.22, of peel, fur
+# and hair at least 0.45.
+STRIPED = 0.25, 0.4
 NONE = 0.3  # levels of contrast, that are as good as none
 COLOURED = 0.5  # x the colour of the detail
 
@@ -83,20 +86,23 @@ def _grey(colors: F32) -> F32:
 def _plainness(levels: F32, clear: Mask, hole: Mask) -> F32:
     """(h, w) in [0, 1] how much of the contrast of what is `clear` (h, w) a hole (h, w) lacks.
 
-    Along the direction in which there is least: streaks are plain, and stripes of striped things
-    are not. On every second pixel.
+    Along the direction in which there is least: streaks are plain. What is striped itself lacks
+    nothing: its stripes go on, and are no texture. On every second pixel.
     """
     grey = cv2.GaussianBlur(_grey(levels), (0, 0), FINE)[::2, ::2]
     x, y = np.gradient(grey, axis=1), np.gradient(grey, axis=0)
-    found = []
+    weak, strong = [], []
     for where in (clear[::2, ::2].astype(np.float32), hole[::2, ::2].astype(np.float32)):
         products = np.dstack([x * x, x * y, y * y, np.ones_like(x)]) * where[..., None]
         xx, xy, yy, total = cv2.split(cv2.GaussianBlur(products, (0, 0), 0.5 * AROUND))
         half, off = 0.5 * (xx + yy), np.sqrt((0.5 * (xx - yy)) ** 2 + xy**2)
-        found.append(np.sqrt(np.maximum(half - off, 0) / np.maximum(total, 1e-3)))
-    usual = float(np.median(found[0][clear[::2, ::2]]))
-    lack = 2 * ENOUGH * usual - found[1]
-    plain = np.clip(lack / (ENOUGH * usual + NONE), 0, 1)
+        total = np.maximum(total, 1e-3)
+        weak.append(np.sqrt(np.maximum(half - off, 0) / total))
+        strong.append(np.sqrt((half + off) / total))
+    usual, across = (float(np.median(way[0][clear[::2, ::2]])) for way in (weak, strong))
+    textured = np.clip((usual / max(across, NONE) - STRIPED[0]) / (STRIPED[1] - STRIPED[0]), 0, 1)
+    lack = 2 * ENOUGH * usual - weak[1]
+    plain = textured * np.clip(lack / (ENOUGH * usual + NONE), 0, 1)
     return np.asarray(cv2.resize(plain, hole.shape[::-1]), np.float32)
 
 
