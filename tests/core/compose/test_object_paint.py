@@ -258,8 +258,10 @@ def _inked(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     return ((after - before) * way).sum(-1) > 0.3 * (way * way).sum(-1)
 
 
+# The places below are the cup's as the shape network sees it.
 # px of the view: on the rim and the wall that comes into view below it; on the wall; its far edge;
 # the saucer behind; the spoon's end; the spoon's bowl
+@pytest.mark.usefixtures("networks")
 @pytest.mark.parametrize(
     "way",
     [
@@ -290,6 +292,7 @@ def test_of_a_side_that_came_into_view_only_what_lay_under_the_brush_is_coloured
             assert inked[(stroke.coverage >= 1) & is_there].mean() > BESIDE_OTHERS
 
 
+@pytest.mark.usefixtures("networks")
 def test_an_edge_that_paint_sets_apart_is_kept_and_comes_back_when_it_is_erased():
     document = _placed(Placement(turn=(50.0, 0.0, 0.0)), _cup())
     stroke, wide = (Stroke(document.photo.size, Brush(radius, 1.0)) for radius in (8.0, 20.0))
