@@ -8,7 +8,7 @@ each little square of the picture covers its part of the texture, however far it
 
 What has neither the photo nor an invented picture shows the plain colours of its Gaussians: a
 stroke colours those that are seen under it, too, as finely as they lie. So it does where a pixel
-shows a texel of another surface (`paint_owners`): the texel stays, and the Gaussians that showed it
+shows a texel of another surface (`texel_owners`): the texel stays, and the Gaussians that showed it
 do not any more.
 """
 
@@ -31,7 +31,7 @@ from ..raster.rules import RULES
 from ..raster.texture import TextureLevels, build_levels
 from .blend import Box
 from .light.lighting import object_texture
-from .paint_owners import ShownSurface, Strays
+from .texel_owners import ShownSurface, Strays
 
 LEAST_SHARE = 0.04  # of a pixel, that a part must give
 STEEPEST = 5.0  # x the usual texels per px: beyond, two neighbours show different places

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from objectmorpher import __main__ as program
-from objectmorpher.cli import idle
+from objectmorpher.cli.idle_options import IDLE, refuse_idle
 from objectmorpher.cli.parser import main, window_parser
 from tests.photos import outlined, saved
 
@@ -74,10 +74,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_what_has_no_effect_is_said_in_one_sentence(
     command: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert len(LINES[command]) == len(idle.IDLE[command])
-    for row, (line, begin) in zip(idle.IDLE[command], LINES[command], strict=True):
+    assert len(LINES[command]) == len(IDLE[command])
+    for row, (line, begin) in zip(IDLE[command], LINES[command], strict=True):
         if isinstance(line, dict):
-            assert idle.refuse_idle(command, line) == (f"{begin} no effect {row.why}",)
+            assert refuse_idle(command, line) == (f"{begin} no effect {row.why}",)
             continue
         before = sorted(folder.iterdir())
         run = program.main if command.startswith("window") else main
@@ -92,7 +92,7 @@ def test_what_has_no_effect_is_said_in_one_sentence(
 
 def test_the_table_names_options_that_there_are() -> None:
     told = (ROOT / "docs" / "reference" / "cli.md").read_text()
-    for command, rows in idle.IDLE.items():
+    for command, rows in IDLE.items():
         section = (
             f"objectmorpher {command}" if not command.startswith("window") else "objectmorpher"
         )
@@ -110,8 +110,8 @@ def test_what_has_an_effect_is_not_refused() -> None:
         {"key": ({"turn": (20.0, 0.0, 0.0)},), "video": "keys", "save_video": "v.gif"},
         {"stiffness": 2.0, "key": ({"handle": ({"at": (1, 2)},)},), "session": "s.omorph"},
     ):
-        idle.refuse_idle("edit", said)
-    idle.refuse_idle("convert", {"count": 500, "source": Path("a.glb"), "flip": True})
+        refuse_idle("edit", said)
+    refuse_idle("convert", {"count": 500, "source": Path("a.glb"), "flip": True})
 
 
 def test_a_second_file_is_no_edit_without_a_display(

@@ -27,7 +27,7 @@ from objectmorpher_core.scripting.script import (
 )
 
 from .commands import check_outputs, edited_by, json_bytes
-from .idle import refuse_idle, said_on
+from .idle_options import refuse_idle, said_on
 from .ray import check_ray
 from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 

@@ -36,8 +36,10 @@ class Subcommand:
 def add_subcommands(
     parser: argparse.ArgumentParser, dest: str, subcommands: Sequence[Subcommand]
 ) -> None:
-    """Add subcommands, one of which is required: `dest` receives its name, `run` its function,
-    `parser` what has read its options."""
+    """Add subcommands, one of which is required.
+
+    Of what is read, `dest` holds its name, `run` its function and `parser` its own parser.
+    """
     words = parser.add_subparsers(dest=dest, required=True, parser_class=type(parser))
     for subcommand in subcommands:
         word = words.add_parser(subcommand.name, help=subcommand.help)

@@ -37,7 +37,7 @@ from objectmorpher_core.splat_files.meshes.textured import plain_glb
 from .. import __version__
 from ..system.logs import log_path
 from ..system.report import without_names
-from .idle import refuse_idle, said_on
+from .idle_options import refuse_idle, said_on
 from .terminal import PROGRAM, UsageError, progress_bar
 
 # `objectmorpher doctor`: what each stage would use on this machine, and what would help.
@@ -105,7 +105,6 @@ EXTRAS = {  # further outputs of `edit` and what each holds
     "save_video": "video",
     "report": "report",
 }
-USUAL_LENGTH = 4.0  # seconds of a video
 LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
 
@@ -203,8 +202,8 @@ def _check_folder(path: Path) -> None:
 
 def _clip(options: argparse.Namespace) -> Clip:
     """The video that is asked for."""
-    length = USUAL_LENGTH if options.seconds is None else options.seconds
-    return Clip(options.video or "morph", length)
+    said = {"motion": options.video, "seconds": options.seconds}
+    return Clip(**{name: value for name, value in said.items() if value is not None})
 
 
 def _endings(what: str) -> tuple[str, ...]:

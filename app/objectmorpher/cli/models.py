@@ -12,7 +12,7 @@ from objectmorpher_core import lift, model_sets, models
 from objectmorpher_core.lift.workers import file as worker_file
 from objectmorpher_core.models import Added, CacheState, HubModel, HubState, TrunkState
 
-from .idle import refuse_idle, said_on
+from .idle_options import refuse_idle, said_on
 from .terminal import UsageError, progress_bar
 
 WIDE, NARROW = 34, 12  # characters of the list's columns

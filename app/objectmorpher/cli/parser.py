@@ -130,7 +130,7 @@ def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
 
 def idle_in_window(options: argparse.Namespace, has_display: bool) -> str | None:
     """Return what on the command line of the window would have no effect: one sentence, or None."""
-    from .idle import refuse_idle, said_on
+    from .idle_options import refuse_idle, said_on
 
     said = said_on(options, options.parser)
     if not has_display and len(options.files) > 1:

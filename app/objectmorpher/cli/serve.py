@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from .idle import refuse_idle, said_on
+from .idle_options import refuse_idle, said_on
 from .terminal import UsageError
 
 if TYPE_CHECKING:

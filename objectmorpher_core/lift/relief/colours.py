@@ -73,7 +73,7 @@ def colouring(
 
 
 def _without_fringe(front: F32, inward: F32) -> F32:
-    """`front` (h, w, 3), its fringe, where `inward` (h, w) is below 1, as what is farther in."""
+    """`front` (h, w, 3) with its fringe (`inward` (h, w) below 1) as what is farther in."""
     is_inner = inward >= 1
     if not is_inner.any():
         return front

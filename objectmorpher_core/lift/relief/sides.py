@@ -4,10 +4,10 @@ An object that is turned far to a side is seen as if its surface were unfolded: 
 shows and what it does not lie side by side, both hardly foreshortened. There the hidden part is a
 hole in a picture, and is filled with patches from beside it, or mirrored ones, along its straight
 edges, as a background is (`compose.plate`). They are taken from about as far along the axis of the
-turn, and where about the colours are that the side is to have: hair goes on as hair. Each Gaussian
-that the photo does not show, or shows from nearly edge on, carries its piece of the picture that
-faces it most, by the same map that carries the photo: it is as sharp, and stays
-the same however the object turns.
+turn, and where about the colours are that the side is to have: hair goes on as hair. Where that is
+plainer than the object, texture is quilted over it. Each Gaussian that the photo does not show, or
+shows from nearly edge on, carries its piece of the picture that faces it most, by the same map that
+carries the photo: it is as sharp, and stays the same however the object turns.
 """
 
 from __future__ import annotations
@@ -314,7 +314,6 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     unknown = cv2.dilate(unknown.astype(np.uint8), np.ones((2 * EDGE + 1,) * 2, np.uint8)) > 0
     known = picture.is_known & ~unknown
     hole = picture.is_object & ~known & wanted
-    hole[:, width:] = False
     if hole.sum() < LEAST or known.sum() < LEAST:
         return None
     scale = min(1.0, (SEARCH / hole.size) ** 0.5)
@@ -351,7 +350,7 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     clear = (known & picture.is_clear).astype(np.uint8)
     clear = cv2.erode(clear, np.ones((2 * MIX + 1,) * 2, np.uint8)) > 0
     heights = np.asarray(cv2.resize(tone[..., -1], hole.shape[::-1]) / HEIGHT, np.float32)
-    filled = np.rint(quilted(filled, known, clear, hole, heights, seed).clip(0, 255))
+    filled = np.rint(quilted(filled, known, clear, hole, heights, seed))
     return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
 
 

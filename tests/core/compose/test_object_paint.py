@@ -14,7 +14,7 @@ from objectmorpher_core.base.brush import Brush, Stroke
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite, object_texture
 from objectmorpher_core.compose.paint import look, with_stroke, without_stroke
-from objectmorpher_core.compose.paint_owners import ShownSurface
+from objectmorpher_core.compose.texel_owners import ShownSurface
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import (

@@ -11,10 +11,10 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from ..base.arrays import F32, Mask
 from ..base.camera import Camera
+from ..base.poisson_disk import nearest_in
 from ..raster import tiles
 from ..raster.posed import SURFACE_GAP, PosedSplats, RestSplats
 from ..raster.texture import TextureLevels
@@ -44,10 +44,7 @@ class ShownSurface:
         is_there = drawn.alpha > SURE
         places = drawn.color / np.maximum(drawn.alpha, 1e-6)[..., None] * size + low
         if is_there.any() and not is_there.all():
-            row, column = distance_transform_edt(  # type: ignore[misc]
-                ~is_there, return_distances=False, return_indices=True
-            )
-            places = places[row, column]
+            places = places.reshape(-1, 3)[nearest_in(is_there)]
         depth = np.where(np.isfinite(drawn.depth), drawn.depth, 0)
         return ShownSurface(places.astype(np.float32), is_there, depth.astype(np.float32))
 

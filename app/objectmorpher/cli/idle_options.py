@@ -1,4 +1,4 @@
-"""Options that do nothing beside the others on a command line: one table, a sentence each."""
+"""The options that do nothing beside others on a command line: a table with a sentence for each."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def said_on(options: argparse.Namespace, parser: argparse.ArgumentParser) -> dic
 
 
 def refuse_idle(command: str, said: Said) -> tuple[str, ...]:
-    """Return a sentence for options that are `said` and do nothing, to be told in the end.
+    """Return sentences about options that are `said` and do nothing, to be printed at the end.
 
     Raises UsageError where that is refused.
     """
