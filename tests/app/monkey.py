@@ -140,13 +140,16 @@ class Player:
     def answered(self) -> bool:
         """Waits until the window has seen all that was done; False where it was quit.
 
-        Its own time counts: not what it waits for a processor that others use.
+        Its own time counts: not what it waits for a processor that others use, nor the time until
+        the screen's pointer is where the window is to see it.
         """
         here = tuple(self.hands.places().get("Pointer", ())[:2])
         right, low = self.size[0] - 3, self.size[1] - 3
         x, y = (right, low) if here != (right, low) else (right - 1, low)
         self.write(f"mousemove {x} {y}")
         start, before = time.monotonic(), _waits(self.process.pid)
+        asked = start  # when the window could answer
+        there = False
         while self.hands.places().get("Pointer", ())[:2] != [x, y]:
             if self.process.poll() is not None:
                 assert self.process.returncode == 0, f"it ended with {self.process.returncode}"
@@ -154,11 +157,14 @@ class Player:
             if self._typist is None or self._typist.poll() is not None:
                 self.write(f"mousemove {x} {y}")
             taken = time.monotonic() - start
-            own = taken - self._waited_since(before)
-            if (own > STUCK and taken > STUCK) or taken > GONE:
+            own = time.monotonic() - asked - self._waited_since(before)
+            if own > STUCK and not there:
+                there = self.hands.pointer() == (x, y)
+                asked, before = time.monotonic(), _waits(self.process.pid)
+            elif own > STUCK or taken > GONE:
                 raise Stuck(f"no answer for {taken:.1f} s, {own:.1f} s of them its own")
             time.sleep(0.004)
-        taken = time.monotonic() - start
+        taken = time.monotonic() - asked
         self.slowest = max(self.slowest, taken - self._waited_since(before))
         return True
 
