@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from . import compose, lift, segment
-from .base.arrays import RGB, Mask, Pixels, Selection
+from .base.arrays import RGB, Mask, Pixels, Selection, crop, unit_pixels
 from .base.camera import Camera
 from .base.files import read_input
-from .base.pixels import crop, unit_pixels
 from .base.progress import Progress, part, silent
 from .compose.composite import OPAQUE, Composite, composite
 from .compose.order import doubt_about_front

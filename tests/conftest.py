@@ -22,7 +22,7 @@ import numpy as np
 
 from objectmorpher_core import segment
 from objectmorpher_core.base.progress import silent
-from objectmorpher_core.models.early_answers import EarlyAnswers
+from objectmorpher_core.models.onnx_session import EarlyAnswers
 from objectmorpher_core.segment import dino_tokens, salience
 from tests import photos, remembered
 

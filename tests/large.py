@@ -14,9 +14,8 @@ from time import perf_counter
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import Mask, Pixels
+from objectmorpher_core.base.arrays import Mask, Pixels, unit_pixels
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.pixels import unit_pixels
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate.plate import hole_margin
 from objectmorpher_core.deform.puppet import puppet_of

@@ -11,9 +11,8 @@ import numpy as np
 from PIL import Image
 from scipy.spatial import KDTree
 
-from objectmorpher_core.base.arrays import F32, F64, RGB, Mask, frozen
+from objectmorpher_core.base.arrays import F32, F64, RGB, Mask, crop, frozen
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.base.rotations import matrices_from_quats, quats_along
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.control_points import sample_control_points

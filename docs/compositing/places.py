@@ -18,8 +18,7 @@ from skimage import data
 from sklearn.datasets import load_sample_image
 from worlds import CAMERA, GAMMA, LIGHTS, SIDE
 
-from objectmorpher_core.base.arrays import F64, Pixels
-from objectmorpher_core.base.pixels import pixels_from_unit
+from objectmorpher_core.base.arrays import F64, Pixels, pixels_from_unit
 from objectmorpher_core.compose.light.harmonize import at_strength, light_gain, light_map
 from objectmorpher_core.compose.silhouette import Silhouette
 from objectmorpher_core.document.model import Document, Photo

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 from sheet import PHOTOS, lifted
 
-from objectmorpher_core.base.arrays import RGB, Mask
-from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.arrays import RGB, Mask, crop
 from objectmorpher_core.document.model import Matte
 from objectmorpher_core.lift.beyond_frame import with_beyond
 from objectmorpher_core.segment.mask_edit import is_selected

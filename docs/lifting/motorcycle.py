@@ -12,9 +12,8 @@ import cv2
 import numpy as np
 from skimage.metrics import structural_similarity
 
-from objectmorpher_core.base.arrays import F32, F64
+from objectmorpher_core.base.arrays import F32, F64, crop
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet

@@ -20,9 +20,8 @@ import numpy as np
 from skimage import data
 from solids import Solid, load, upright
 
-from objectmorpher_core.base.arrays import F64, Mask, Pixels
+from objectmorpher_core.base.arrays import F64, Mask, Pixels, crop
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal, turn_matrix, turn_of
 from objectmorpher_core.compose.composite import object_texture

@@ -12,8 +12,7 @@ import numpy as np
 from methods import Method, methods
 from truth import continued, ellipse, fitted, photo, strands
 
-from objectmorpher_core.base.arrays import Mask, Pixels
-from objectmorpher_core.base.pixels import pixels_from_unit
+from objectmorpher_core.base.arrays import Mask, Pixels, pixels_from_unit
 
 SIZES = {"1 MP": (1155, 866), "24 MP": (6000, 4000)}
 RUNS = {"1 MP": 5, "24 MP": 3}

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, eye_array
 from scipy.sparse.linalg import spsolve
 
-from objectmorpher_core.base.arrays import F32, Mask, Pixels, Selection
-from objectmorpher_core.base.pixels import unit_pixels
+from objectmorpher_core.base.arrays import F32, Mask, Pixels, Selection, unit_pixels
 from objectmorpher_core.segment.mask_edit import FULL, grow, is_selected, is_soft
 from objectmorpher_core.segment.matting.matte import band_width, signed_distance
 

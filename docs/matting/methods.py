@@ -8,8 +8,7 @@ from importlib.util import find_spec
 import first_version
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32, Pixels, Selection
-from objectmorpher_core.base.pixels import crop, unit_pixels
+from objectmorpher_core.base.arrays import F32, Pixels, Selection, crop, unit_pixels
 from objectmorpher_core.segment.mask_edit import FULL, is_selected
 from objectmorpher_core.segment.matting.matte import REACH, band_width, cut_out, signed_distance
 

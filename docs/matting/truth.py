@@ -18,8 +18,7 @@ import skimage.data
 import sklearn.datasets
 from scipy.ndimage import gaussian_filter1d
 
-from objectmorpher_core.base.arrays import F32, RGB, Mask, Selection
-from objectmorpher_core.base.pixels import pixels_from_unit, unit_pixels
+from objectmorpher_core.base.arrays import F32, RGB, Mask, Selection, pixels_from_unit, unit_pixels
 from objectmorpher_core.segment.mask_edit import enclosed, shrink, smooth
 from objectmorpher_core.segment.matting.matte import signed_distance
 

@@ -15,8 +15,7 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, Mask, Pixels
-from ..base.pixels import pixels_from_unit, unit_pixels
+from ..base.arrays import F32, Mask, Pixels, pixels_from_unit, unit_pixels
 from ..base.threads import in_threads
 from ..raster.reference_layers import Picture3D
 

@@ -13,9 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from ..base.arrays import F32, Mask, Pixels
+from ..base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ..base.camera import Camera
-from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
 from ..deform.puppet import Puppet, puppet_of
 from ..document.bounds import MULTIPLY, NORMAL, SCREEN

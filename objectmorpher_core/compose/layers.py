@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.pixels import crop, pixels_from_unit
+from ..base.arrays import crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
 from ..document.bounds import NORMAL
 from ..document.model import Document, EditObject, Matte, Plate

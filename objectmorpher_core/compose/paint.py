@@ -19,9 +19,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, F64, Mask
+from ..base.arrays import F32, F64, Mask, unit_pixels
 from ..base.camera import Camera
-from ..base.pixels import unit_pixels
 from ..document.model import LiftedObject, Matte
 from ..document.paint import Paint
 from ..raster import tiles

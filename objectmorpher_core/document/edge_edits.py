@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import F32, U8, Mask, frozen
-from ..base.pixels import crop
+from ..base.arrays import F32, U8, Mask, crop, frozen
 from .model import Document, EditObject, Matte, Photo
 from .settings import Refined
 

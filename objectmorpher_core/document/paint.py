@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F32, U8, Mask, frozen
-from ..base.pixels import crop
+from ..base.arrays import F32, U8, Mask, crop, frozen
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 SIDE = 512  # px, of a tile

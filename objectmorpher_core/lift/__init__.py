@@ -48,7 +48,7 @@ class Lifter(Protocol):
 BACKENDS = {  # imported when chosen
     "relief": "objectmorpher_core.lift.relief.lifter:ReliefLifter",
     "trellis": "objectmorpher_core.lift.trellis.lifter:TrellisLifter",
-    "cupid": "objectmorpher_core.lift.trellis.cupid_lifter:CupidLifter",
+    "cupid": "objectmorpher_core.lift.trellis.lifter:CupidLifter",
     "triposplat": "objectmorpher_core.lift.triposplat.lifter:TripoSplatLifter",
 }
 

@@ -13,9 +13,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .. import compose
-from ..base.arrays import F32, F64, Mask, Selection
+from ..base.arrays import F32, F64, Mask, Selection, crop
 from ..base.camera import Camera
-from ..base.pixels import crop
 from ..base.progress import Progress, part, silent
 from ..base.rotations import matrices_from_quats, quats_from_matrices
 from ..compose.plate.plate import plate_cover

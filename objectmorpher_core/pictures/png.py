@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import cv2
 import numpy as np
 
-from ..base.pixels import PixelSource
+from ..base.arrays import PixelSource
 from ..base.threads import core_count
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 from PIL.TiffTags import LONG, SHORT, UNDEFINED
 
-from ..base.pixels import PixelSource
+from ..base.arrays import PixelSource
 
 if TYPE_CHECKING:
     from PIL.TiffImagePlugin import ImageFileDirectory_v2

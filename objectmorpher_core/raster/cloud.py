@@ -15,9 +15,8 @@ import numpy as np
 from ..base.kernel_files import numba
 from ..base.threads import FAST
 from . import rules as p
-from .bell import SIXTEENTH, rows_of
 from .rules import HALF, INFINITE, ONE, ZERO
-from .tile_memory import STRIP, clear_tile, number_pixels, write_rgba
+from .tile_memory import SIXTEENTH, STRIP, clear_tile, number_pixels, rows_of, write_rgba
 
 WIDE, TALL = STRIP, 64  # px, of a tile
 PIXELS = WIDE * TALL

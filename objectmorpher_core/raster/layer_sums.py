@@ -12,9 +12,9 @@ from ..base.kernel_files import numba
 from ..base.threads import FAST
 from . import rules as p
 from . import tile_memory as m
-from .bell import bell
 from .intrinsics import lesser
 from .rules import LAYERS, ONE, THREE, TWO, ZERO
+from .tile_memory import bell
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -15,7 +15,6 @@ from ..base.kernel_files import numba
 from ..base.threads import FAST
 from . import rules as p
 from . import tile_memory as m
-from .bell import bell, strip_rows
 from .binning import TILE
 from .compositing import composite_layer, look_up
 from .intrinsics import fetch
@@ -32,6 +31,7 @@ from .layer_sums import (
     take,
 )
 from .rules import HALF, INFINITE, LAYERS, ONE, ZERO, limits_of
+from .tile_memory import bell, strip_rows
 
 # Tiles inside a surface: sums at every second pixel, and the photo at every one.
 #

@@ -15,10 +15,9 @@ import numpy as np
 from ..base.arrays import F32, F64, frozen
 from ..base.camera import Camera
 from ..base.threads import in_threads
-from .binning import TILE, TiledSplats, bin_tiles
+from .binning import TILE, TiledSplats, bin_tiles, depth_order
 from .cloud import TALL, WIDE, draw_one_by_one
 from .compositing import PhotoLookup
-from .depth_order import depth_order
 from .posed import PosedSplats
 from .projection import project
 from .reference import Picture3D

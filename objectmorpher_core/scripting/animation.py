@@ -17,9 +17,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, RGB, U8, Mask
+from ..base.arrays import F32, RGB, U8, Mask, crop, pixels_from_unit, unit_pixels
 from ..base.camera import Camera
-from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
 from ..base.rotations import Gimbal, matrix_from_vector, vector_from_matrix
 from ..compose.composite import composite

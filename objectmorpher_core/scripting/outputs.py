@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.arrays import F32, RGB
-from ..base.pixels import crop, pixels_from_unit
+from ..base.arrays import F32, RGB, crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
 from ..base.quoting import shown
 from ..compose.composite import Composite, composite, object_texture, straight_cutout

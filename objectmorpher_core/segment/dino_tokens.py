@@ -13,8 +13,7 @@ import numpy as np
 from .. import models
 from ..base.arrays import F32, RGB
 from ..base.progress import Progress, silent
-from ..models.early_answers import EarlyAnswers
-from ..models.onnx_session import open_session, run_session
+from ..models.onnx_session import EarlyAnswers, open_session, run_session
 from .salience import DEVIATION, MEAN
 
 WEIGHT = "dinov2-vits14"

@@ -8,11 +8,10 @@ import numpy as np
 from ..base.arrays import F32, RGB, Mask
 from ..base.progress import Progress, silent
 from ..document.model import Prompt
-from .choice import guess
 from .matting.edges import cut
 from .salience import SubjectNet
 from .selection import SelectionError, at_level, check_prompt, free_mask
-from .walk import Walk
+from .walk import Walk, guess
 
 CELLS = 4000  # of a photo
 COLOR_STEP = 14.0  # CIELAB units; two colours this far apart are 0.5 apart in the walk

@@ -15,8 +15,7 @@ import numpy as np
 
 from .. import models
 from ..base.arrays import F32, RGB
-from ..models.early_answers import EarlyAnswers
-from ..models.onnx_session import open_session
+from ..models.onnx_session import EarlyAnswers, open_session
 
 WEIGHT = "u2netp"
 INPUT_SIDE = 320  # px, as it was trained

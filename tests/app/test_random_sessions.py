@@ -21,8 +21,8 @@ from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher.tools.pointer import Button, Pointer
 from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.base.arrays import crop
 from objectmorpher_core.base.brush import Brush
-from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document.hold_edits import Stays
 from objectmorpher_core.document.model import Document, EditObject, Placement
 from strokes import stroke

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Sparse
+from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Sparse, crop
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import (
     Document,

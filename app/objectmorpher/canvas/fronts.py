@@ -118,7 +118,7 @@ class RefinedView:
 
 def _refined_levels(refined: Refined) -> TextureLevels:
     """At full strength: premultiplied, with halved copies for what is shown smaller than it is."""
-    from objectmorpher_core.base.pixels import unit_pixels
+    from objectmorpher_core.base.arrays import unit_pixels
     from objectmorpher_core.raster.texture import build_levels
 
     weights = refined.alpha.astype(np.float32) / np.float32(255)

@@ -18,7 +18,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.kernel_files import numba
 from objectmorpher_core.base.threads import FAST, LEAST_ROWS, in_threads
 from objectmorpher_core.deform.skinning import Skin, nodes_of
-from objectmorpher_core.raster.depth_order import depth_order
+from objectmorpher_core.raster.binning import depth_order
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.rules import RULES
 from objectmorpher_core.raster.texture import TextureLevels

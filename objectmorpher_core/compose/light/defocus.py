@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, U8, Mask, Pixels
+from ...base.arrays import F32, F64, U8, Mask, Pixels, crop, unit_pixels
 from ...base.camera import Camera
-from ...base.pixels import crop, unit_pixels
 from ...document.model import Matte
 from ...raster.posed import PosedSplats
 from ..plate.plate import hole_margin

@@ -25,8 +25,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, U8
-from ...base.pixels import unit_pixels
+from ...base.arrays import F32, F64, U8, unit_pixels
 from ...document.model import Document
 from ..shadow.shadow import GAMMA
 from ..silhouette import Silhouette, sampled

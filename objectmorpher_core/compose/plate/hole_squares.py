@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, Mask, Pixels
-from ...base.pixels import pixels_from_unit, unit_pixels
+from ...base.arrays import F32, Mask, Pixels, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, part, silent
 from .. import InpaintError
 from .completion import smooth, sources_like

@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 
 from ... import models
-from ...base.arrays import F32, RGB, Mask, Pixels
-from ...base.pixels import unit_pixels
+from ...base.arrays import F32, RGB, Mask, Pixels, unit_pixels
 from ...base.progress import Progress
 from ...models import ModelError, device, ledger
 from ...models.plans import Plan

@@ -14,8 +14,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, Mask, Pixels
-from ...base.pixels import crop, pixels_from_unit, unit_pixels
+from ...base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint

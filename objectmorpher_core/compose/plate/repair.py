@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, RGB, Mask, Pixels
-from ...base.pixels import crop, pixels_from_unit, unit_pixels
+from ...base.arrays import F32, RGB, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Plate
 from ...pictures.image import to_u8

@@ -18,9 +18,8 @@ import cv2
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...base.arrays import F32, F64, I64, Mask, Pixels
+from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
-from ...base.pixels import crop, pixels_from_unit, unit_pixels
 from ...document.model import Document, EditObject, Matte, Plate
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo

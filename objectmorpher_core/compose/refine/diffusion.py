@@ -13,8 +13,7 @@ import cv2
 import numpy as np
 
 from ... import models
-from ...base.arrays import F32, RGB
-from ...base.pixels import unit_pixels
+from ...base.arrays import F32, RGB, unit_pixels
 from ...base.progress import Progress
 from ...models import HubModel, ModelError, device, ledger
 from ...models.plans import Network, PipelineNeed, Plan

@@ -17,8 +17,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, RGB, U8, Pixels
-from ...base.pixels import pixels_from_unit, unit_pixels
+from ...base.arrays import F32, F64, RGB, U8, Pixels, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, part
 from ...document.settings import Refined
 from ...pictures.image import to_u8

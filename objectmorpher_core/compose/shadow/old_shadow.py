@@ -13,8 +13,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, Mask, Pixels
-from ...base.pixels import crop, pixels_from_unit, unit_pixels
+from ...base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, silent
 from ...document.model import Plate
 from ...document.settings import Hint, Shadow

@@ -23,8 +23,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, Mask, Pixels
-from ...base.pixels import unit_pixels
+from ...base.arrays import F32, F64, Mask, Pixels, unit_pixels
 from ...document.model import Matte
 from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, OldShadow, edge_blur

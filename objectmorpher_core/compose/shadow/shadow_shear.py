@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64
-from ...base.pixels import crop
+from ...base.arrays import F32, F64, crop
 from ...document.settings import Shadow
 from .shadow import BAND, BAND_BLUR, BAND_DROP, BLURS, FADE, FAINTEST, HARDEST, last_blur, smooth
 

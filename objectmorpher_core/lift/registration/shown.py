@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, Mask
+from ...base.arrays import F32, F64, Mask, crop
 from ...base.camera import Camera
-from ...base.pixels import crop
 from ...base.poisson_disk import distance_inside, thin_to_spacing
 from ...document.model import LiftedObject, Matte
 from ...raster import tiles

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, Mask, Pixels, frozen
+from ...base.arrays import F32, F64, Mask, Pixels, crop, frozen, unit_pixels
 from ...base.camera import Camera
-from ...base.pixels import crop, unit_pixels
 from ...base.rotations import matrix_from_vector
 from .. import LiftError
 from .sketch import COLOR, COVERAGE, NORMAL, Surfels, sketch

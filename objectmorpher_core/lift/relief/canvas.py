@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, Mask, frozen
+from ...base.arrays import F32, F64, Mask, crop, frozen
 from ...base.kernel_files import numba
-from ...base.pixels import crop
 from ...base.poisson_disk import nearest_in
 from ...base.threads import LEAST_ROWS, in_threads
 from ...document.model import Matte

@@ -15,9 +15,8 @@ import numpy as np
 from ...base.arrays import F32, F64, Mask, frozen
 from ...base.kernel_files import numba
 from .canvas import ReliefCanvas, bilinear
-from .fringe import inwardness
 from .mirror import MirrorAxis
-from .silhouette import ReliefSilhouette
+from .silhouette import ReliefSilhouette, inwardness
 
 FINENESS = 3.0  # px to a mean spacing: more of the photo plain colours need not see
 BLUR = 1.2  # x mean spacing: plain colours, so that neighbours agree

@@ -18,9 +18,8 @@ import cv2
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...base.arrays import F32, F64, I64, Mask
+from ...base.arrays import F32, F64, I64, Mask, unit_pixels
 from ...base.camera import Camera
-from ...base.pixels import unit_pixels
 from ...base.poisson_disk import nearest_in
 from ...document.model import LiftedObject, Matte
 from ...document.sides import FurtherView, Sides

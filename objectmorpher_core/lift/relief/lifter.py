@@ -25,9 +25,8 @@ from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
 from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of, rounded
 from . import shape_look
-from .body import MIDDLE, ReliefBody, leaning
+from .body import MIDDLE, ReliefBody, closed, leaning
 from .canvas import ReliefCanvas, bilinear
-from .closing import closed
 from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow

@@ -36,8 +36,8 @@ from ...raster.rules import RULES
 from ...raster.texture import build_levels
 from .canvas import bilinear
 from .colours import fill_in
-from .fringe import inwardness
 from .quilting import quilted
+from .silhouette import inwardness
 
 AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))

@@ -7,9 +7,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...base.arrays import F64
-from .drawing import Mesh
 from .evidence import NORMAL_ERROR, TAIL, Build, Evidence, Misfit, refined
-from .solids import box
+from .solids import Mesh, box
 
 # A flat sheet that looks like the photo: a plane from the network's front and normals.
 

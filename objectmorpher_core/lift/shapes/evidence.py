@@ -18,7 +18,7 @@ from ...base.arrays import F64, Mask
 from ...base.kernel_files import numba
 from ..crop import rays
 from ..relief.shape_look import SeenShape
-from .drawing import Mesh, RayGrid, drawn, face_normals
+from .solids import Mesh, RayGrid, drawn, face_normals
 
 # The numbers of a shape that fit the evidence best, from a first guess.
 

@@ -17,9 +17,8 @@ import numpy as np
 
 from ...base.arrays import F64, Mask
 from ...base.kernel_files import numba
-from .drawing import Mesh
 from .evidence import STRIDE, Evidence
-from .solids import AROUND, revolved
+from .solids import AROUND, Mesh, revolved
 
 TRIED = 40  # places on the axis, at which the profile's ends are looked for
 PLACES = 24  # of the profile itself

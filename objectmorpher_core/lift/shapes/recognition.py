@@ -17,9 +17,9 @@ from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
 from .boxes import fit_box, fit_flat
-from .drawing import Drawn, Mesh, RayGrid, drawn
 from .evidence import Evidence, Misfit
 from .round import fit_ellipsoid, fit_revolution, fit_ring
+from .solids import Drawn, Mesh, RayGrid, drawn
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
 BEYOND = 2.0  # cells from a shape's own outline, up to which its sides go on

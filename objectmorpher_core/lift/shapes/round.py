@@ -10,10 +10,9 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F64, Mask
-from .drawing import Mesh, drawn
 from .evidence import HOPELESS, STRIDE, Evidence, Misfit, least
 from .lathe import Lathe, Profile
-from .solids import AROUND, FINE, ellipsoid, tube
+from .solids import AROUND, FINE, Mesh, drawn, ellipsoid, tube
 
 # A ring that looks like the photo: a round tube about an axis, as a doughnut, a tyre, a bracelet.
 #

@@ -22,10 +22,9 @@ from ..relief.cuts import Behind, Cuts
 from ..relief.integration import solved
 from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
-from .drawing import Mesh, RayGrid, drawn
 from .evidence import Evidence
 from .rims import Rim, at_edge
-from .solids import AROUND, FINE, revolved
+from .solids import AROUND, FINE, Mesh, RayGrid, drawn, revolved
 
 CLOSED = 3.0  # cells from the outline, within which nothing lies behind what stands
 NEAR = 1.5  # cells from a rim's picture, where the front is on it

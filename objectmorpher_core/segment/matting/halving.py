@@ -5,9 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, frozen
+from ...base.arrays import F32, frozen, unit_pixels
 from ...base.kernel_files import numba
-from ...base.pixels import unit_pixels
 from ...base.threads import in_threads
 
 LEAST_ROWS = 128  # for which a second thread is woken

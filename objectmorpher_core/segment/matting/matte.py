@@ -13,8 +13,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, U8, Mask, Pixels, Selection
-from ...base.pixels import unit_pixels
+from ...base.arrays import F32, F64, U8, Mask, Pixels, Selection, unit_pixels
 from ...document.model import Matte
 from ..mask_edit import FULL, grow, is_selected, is_soft
 from .soft_edge import find_alpha

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, U8, Mask, Pixels, Selection
-from ...base.pixels import crop, unit_pixels
+from ...base.arrays import F32, U8, Mask, Pixels, Selection, crop, unit_pixels
 from ...document.model import Matte
 from ..mask_edit import FULL, as_coverage, is_selected
 from ..selection import box_around

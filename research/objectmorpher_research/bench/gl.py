@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from objectmorpher_core.raster.depth_order import depth_order
+from objectmorpher_core.raster.binning import depth_order
 
 from .classic_gl import ClassicViewer
 from .scenes import BenchScene, Row

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from objectmorpher_core.raster import reference, tiles
-from objectmorpher_core.raster.binning import bin_tiles
-from objectmorpher_core.raster.depth_order import depth_order
+from objectmorpher_core.raster.binning import bin_tiles, depth_order
 from objectmorpher_core.raster.projection import project
 from objectmorpher_core.raster.rules import Z
 

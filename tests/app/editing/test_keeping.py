@@ -15,7 +15,7 @@ from objectmorpher.cli import parser as cli
 from objectmorpher.commands import next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Shown, ToolName
-from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.arrays import crop
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement, Prompt

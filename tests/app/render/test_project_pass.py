@@ -9,7 +9,7 @@ from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.deform.jacobians import LEAST_STRETCH, MOST_STRETCH
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import rules as p
-from objectmorpher_core.raster.depth_order import depth_order
+from objectmorpher_core.raster.binning import depth_order
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.projection import project
 from objectmorpher_core.raster.rules import RULES

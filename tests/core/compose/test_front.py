@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from objectmorpher_core.base.pixels import crop, unit_pixels
+from objectmorpher_core.base.arrays import crop, unit_pixels
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.layers import layers

@@ -9,8 +9,7 @@ import pytest
 
 from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
-from objectmorpher_core.lift.relief.closing import closed
+from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody, closed
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from tests import shapes
 

@@ -8,8 +8,8 @@ import pytest
 from skimage import data
 
 from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.lift.relief.fringe import inwardness
 from objectmorpher_core.lift.relief.quilting import quilted
+from objectmorpher_core.lift.relief.silhouette import inwardness
 
 SIDE = 240  # px
 COARSE = 9.0  # px

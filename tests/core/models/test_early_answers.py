@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.progress import Cancelled
-from objectmorpher_core.models.early_answers import EarlyAnswers
+from objectmorpher_core.models.onnx_session import EarlyAnswers
 from tests import photos
 
 KEPT = 2

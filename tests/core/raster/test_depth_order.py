@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.raster.depth_order import depth_order
+from objectmorpher_core.raster.binning import depth_order
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 5000])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.model import Click, Prompt
-from objectmorpher_core.segment.pieces import correcting
+from objectmorpher_core.segment.pieces import answers
 from objectmorpher_core.segment.pieces.answers import PieceAnswer, add_click
 from objectmorpher_core.segment.pieces.choice import Correction, PieceGround, correct
 from objectmorpher_core.segment.pieces.pieces import Pieces
@@ -117,9 +117,9 @@ def test_a_window_that_cuts_off_what_a_click_means_is_widened():
     short = np.zeros_like(mask)
     short[76:84, 140:144] = True
     ground = PieceGround(Pieces(image, None), None)
-    window = correcting._around(short)
+    window = answers._around(short)
     assert window.bottom - window.top < 50
-    found = correcting._finer(ground, image, mask, prompt, window)
+    found = answers._finer(ground, image, mask, prompt, window)
     assert found[strip].mean() > 0.8
     assert found[body].mean() < 0.02
 

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.arrays import F32, Mask, crop
 from objectmorpher_core.document.model import Matte
 from objectmorpher_core.segment.matting.matte import build_matte
 from objectmorpher_core.segment.matting.repair import (

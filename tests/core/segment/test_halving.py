@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.base.pixels import unit_pixels
+from objectmorpher_core.base.arrays import unit_pixels
 from objectmorpher_core.segment.matting.halving import doubled, halved, halved_pixels
 
 F32 = 1e-6

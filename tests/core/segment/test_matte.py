@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.base.pixels import crop, pixels_from_unit, unit_pixels
+from objectmorpher_core.base.arrays import crop, pixels_from_unit, unit_pixels
 from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.segment.matting import soft_edge, unmix
 from objectmorpher_core.segment.matting.matte import (

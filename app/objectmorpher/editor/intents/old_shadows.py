@@ -15,8 +15,7 @@ from weakref import WeakSet
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.arrays import Mask, crop
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
 from objectmorpher_core.document.settings import Shadow

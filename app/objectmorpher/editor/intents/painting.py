@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.base.arrays import F32, crop, unit_pixels
 from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.pixels import crop, unit_pixels
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
 

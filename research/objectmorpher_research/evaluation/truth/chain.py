@@ -218,7 +218,7 @@ def coverage(result: Composite, document: Document) -> F64:
     if not result.moved:
         matte = document.objects[0].matte
         assert matte is not None
-        from objectmorpher_core.base.pixels import crop
+        from objectmorpher_core.base.arrays import crop
 
         width, height = document.photo.size
         return crop(matte.alpha, matte.box, (0, 0, width, height)).astype(np.float64)

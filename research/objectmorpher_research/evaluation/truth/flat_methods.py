@@ -13,8 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from objectmorpher_core.base.arrays import F64, I32, RGB
-from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.arrays import F64, I32, RGB, crop
 from objectmorpher_core.document.model import Matte
 
 from .cases import TruthCase, TruthGuidance

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import F64, I32, RGB
-from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.arrays import F64, I32, RGB, crop
 from objectmorpher_core.document.model import Matte
 
 from .lookup import looked_up

@@ -34,7 +34,7 @@ from objectmorpher_core.lift.workers.file import LiftWorker, read_worker, worker
 from . import TrainingError
 
 if TYPE_CHECKING:
-    from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter
+    from objectmorpher_core.lift.trellis.lifter import CupidLifter
 
 ANSWER = "pose.json"
 
@@ -113,7 +113,7 @@ class CupidPoses:
         return None if b is None or a is None else a @ np.linalg.inv(b)
 
     def _lifter(self) -> CupidLifter:
-        from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter
+        from objectmorpher_core.lift.trellis.lifter import CupidLifter
 
         return CupidLifter()
 

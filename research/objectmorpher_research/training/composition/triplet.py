@@ -16,9 +16,8 @@ import cv2
 import numpy as np
 
 from objectmorpher_core import compose, lift, segment
-from objectmorpher_core.base.arrays import F32, F64, RGB, U8, Mask
+from objectmorpher_core.base.arrays import F32, F64, RGB, U8, Mask, unit_pixels
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.pixels import unit_pixels
 from objectmorpher_core.base.progress import Progress, part, silent
 from objectmorpher_core.compose import InpaintError
 from objectmorpher_core.compose.light.lighting import object_texture

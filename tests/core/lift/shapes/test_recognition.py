@@ -18,8 +18,17 @@ from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.shape_look import SeenShape
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.shapes import completed, flattened, recognised, rounded
-from objectmorpher_core.lift.shapes.drawing import Mesh, RayGrid, drawn, face_normals
-from objectmorpher_core.lift.shapes.solids import box, ellipsoid, revolved, sheet, tube
+from objectmorpher_core.lift.shapes.solids import (
+    Mesh,
+    RayGrid,
+    box,
+    drawn,
+    ellipsoid,
+    face_normals,
+    revolved,
+    sheet,
+    tube,
+)
 from objectmorpher_research.training.shape_eval import Surfaces, camera_of, score, surfaces_of
 
 WIDTH = 0.8  # tangents, of the crop

@@ -11,9 +11,8 @@ from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.shapes import laid, rims_of
-from objectmorpher_core.lift.shapes.drawing import Mesh, RayGrid, drawn
 from objectmorpher_core.lift.shapes.rims import Rim, at_edge
-from objectmorpher_core.lift.shapes.solids import ellipsoid, revolved
+from objectmorpher_core.lift.shapes.solids import Mesh, RayGrid, drawn, ellipsoid, revolved
 from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_research.training.shape_eval import score, surfaces_of
 from tests.core.lift.shapes.test_recognition import AT, as_far, body_of, see

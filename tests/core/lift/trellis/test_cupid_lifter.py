@@ -17,10 +17,9 @@ from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.registration.placement import Hints, Registrar
 from objectmorpher_core.lift.trellis.camera import view
 from objectmorpher_core.lift.trellis.cupid import CupidGenerator, centres
-from objectmorpher_core.lift.trellis.cupid_lifter import pose_seen
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.latent import looked_up
-from objectmorpher_core.lift.trellis.lifter import FITS, placed
+from objectmorpher_core.lift.trellis.lifter import FITS, placed, pose_seen
 from objectmorpher_core.lift.trellis.picture import ConditionPicture
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.pipeline import lift_mask
