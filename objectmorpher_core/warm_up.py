@@ -25,14 +25,8 @@ from .base.progress import silent
 from .base.threads import core_count
 from .deform.puppet import Puppet, puppet_of
 from .document.gaussians import Gaussians
-from .document.model import (
-    DeformSettings,
-    Document,
-    EditObject,
-    LiftedObject,
-    PhotoTexture,
-    Placement,
-)
+from .document.model import Document, EditObject, LiftedObject, PhotoTexture, Placement
+from .document.settings import DeformSettings
 from .raster import tiles
 from .raster.posed import PosedSplats, RestSplats
 from .raster.rules import SPAN

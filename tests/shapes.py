@@ -20,7 +20,6 @@ from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.deform.skinning import Skinned
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import (
-    DeformSettings,
     Document,
     EditObject,
     Handle,
@@ -32,11 +31,12 @@ from objectmorpher_core.document.model import (
     Placement,
     Plate,
 )
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_core.raster.texture import TextureLevels, build_levels
 from objectmorpher_core.segment.matting.matte import extended_mask, frame_extension
 from tests import remembered

@@ -35,7 +35,7 @@ CORE_AT_IMPORT = {
 }  # fmt: skip
 LATER = {  # than the window's first frame
     "scipy", "numba", "torch", "diffusers", "onnxruntime", "skimage", "ray", "http",
-    "objectmorpher.server.address", "objectmorpher.server.offers",
+    "objectmorpher.server.address", "objectmorpher.server.running",
 }  # fmt: skip
 
 WINDOW_IMPORT = "import objectmorpher.cli.parser, objectmorpher.gui.window.window"

@@ -15,8 +15,8 @@ from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.compose.light.lighting import estimate_light, object_texture
 from objectmorpher_core.compose.light.relight import relight
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, LiftSettings, Placement
-from objectmorpher_core.document.settings import USUAL_RELIGHT
+from objectmorpher_core.document.model import LiftSettings, Placement
+from objectmorpher_core.document.settings import USUAL_RELIGHT, DeformSettings
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster import tiles
 

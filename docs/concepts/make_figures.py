@@ -19,7 +19,8 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.deform.puppet import puppet_of
-from objectmorpher_core.document.model import DeformSettings, Document
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.pictures.image import to_u8
 from objectmorpher_core.raster import tiles
 

@@ -15,7 +15,8 @@ from objectmorpher_core.deform.binding import bind
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.deform.graph import LINK_RADIUS, ControlGraph
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.document.model import DeformSettings, Handle
+from objectmorpher_core.document.model import Handle
+from objectmorpher_core.document.settings import DeformSettings
 
 DRAG = 0.2  # x diameter
 PIN_DOT, LINE = 4.0, 0.6  # px

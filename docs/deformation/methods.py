@@ -15,7 +15,8 @@ from objectmorpher_core.deform.binding import bind
 from objectmorpher_core.deform.deformer import FAITHFUL_ITERATIONS, Deformer, Strain, measure_strain
 from objectmorpher_core.deform.graph import build_graph
 from objectmorpher_core.deform.skinning import Motion, Skinned, skin_faithful
-from objectmorpher_core.document.model import DeformSettings, Handle, LiftedObject, Pose
+from objectmorpher_core.document.model import Handle, LiftedObject, Pose
+from objectmorpher_core.document.settings import DeformSettings
 
 REPEATS = 5
 DRAG_STEPS = 60

@@ -25,7 +25,8 @@ from objectmorpher_core.base.progress import silent
 from objectmorpher_core.base.rotations import turn_matrix, turn_of
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, LiftedObject, Matte, Placement
+from objectmorpher_core.document.model import LiftedObject, Matte, Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift import LiftError, LiftSubject
 from objectmorpher_core.lift.registration.other_photo import OtherPhoto, with_photo
 from objectmorpher_core.lift.relief.lifter import ReliefLifter

@@ -17,13 +17,8 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import (
-    DeformSettings,
-    LiftedObject,
-    LiftSettings,
-    Matte,
-    Placement,
-)
+from objectmorpher_core.document.model import LiftedObject, LiftSettings, Matte, Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.depth_prior import NetworkDepth

@@ -19,8 +19,9 @@ from smear import smear_of
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import DeformSettings, Document, Placement
+from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import gimbal_of
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, open_photo, select
 from objectmorpher_core.raster.trust import trust_in

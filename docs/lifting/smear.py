@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64, Mask
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 
 STRETCHED = 0.6  # photo px per px, along the direction drawn out most, below which it is new
 SURE = 0.98  # alpha: nothing of what is behind is in it

@@ -11,9 +11,10 @@ from turning import CAMERA, EDITS, SEEN, Scene, Score, Shot, middle_of, score
 
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, Placement
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 
 SHOWN = tuple(key for key in EDITS if key.startswith(("yaw", "pitch")))
 

@@ -26,7 +26,8 @@ from objectmorpher_core.base.progress import silent
 from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal, turn_matrix, turn_of
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, LiftSettings, Matte, Placement, Pose
+from objectmorpher_core.document.model import LiftSettings, Matte, Placement, Pose
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.depth_prior import NetworkDepth
 from objectmorpher_core.lift.relief.lifter import ReliefLifter

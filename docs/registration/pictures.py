@@ -11,7 +11,8 @@ import truth
 
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, Placement
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift.registration.imported import lift_imported
 from objectmorpher_core.lift.registration.placement import Registration
 from objectmorpher_core.segment.matting.matte import build_matte

@@ -24,7 +24,7 @@ import numpy as np
 from cost import Canvas
 
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document.model import DeformSettings
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_research.bench.bodies import five_limbs, limb_handles
 from objectmorpher_research.bench.render import tiles_frame

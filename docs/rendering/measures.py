@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 
 GREY = 0.5  # of the ground that objects are shown on
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)

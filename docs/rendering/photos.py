@@ -15,7 +15,8 @@ from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import GAUSSIANS, DeformSettings, LiftSettings, Placement
+from objectmorpher_core.document.model import GAUSSIANS, LiftSettings, Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.pipeline import lift_mask, open_photo, select
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats

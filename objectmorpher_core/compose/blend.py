@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.arrays import F32, Mask, Pixels, pixels_from_unit, unit_pixels
 from ..base.threads import in_threads
-from ..raster.reference_layers import Picture3D
+from ..raster.reference import Picture3D
 
 STILL = 0.05  # px: a surface that moved less is where it was
 STILL_ALPHA = 1.5 / 255  # likewise for its alpha

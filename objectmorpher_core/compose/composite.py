@@ -23,7 +23,7 @@ from ..document.settings import AS_IN_THE_PHOTO, Refined
 from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
-from ..raster.reference_layers import Picture3D
+from ..raster.reference import Picture3D
 from .blend import FEATHER_START as FEATHER_START
 from .blend import (
     NEAR,

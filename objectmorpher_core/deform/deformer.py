@@ -16,9 +16,10 @@ from ..base.arrays import F64, I32, Sparse, frozen, frozen_rows
 from ..base.kernel_files import numba
 from ..base.rotations import matrix_from_vector
 from ..base.threads import FAST
-from ..document.model import DeformSettings, LiftedObject
+from ..document.model import LiftedObject
 from ..document.pose import UNHELD, Base, Handle, Pose, turn_at
 from ..document.rig import Rig
+from ..document.settings import DeformSettings
 from .anderson import Anderson
 from .arap import TOLERANCE, ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind

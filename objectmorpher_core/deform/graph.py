@@ -10,8 +10,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
 from ..base.arrays import F64, I32, Mask
-from ..document.model import DeformSettings
 from ..document.rig import Seam
+from ..document.settings import DeformSettings
 from .surface_links import (
     CHUNK,
     TINY,

@@ -12,12 +12,13 @@ import numpy as np
 from ..base.arrays import F64, I32
 from ..base.camera import Camera
 from ..document.gaussians import Gaussians
-from ..document.model import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose
+from ..document.model import EditObject, LiftedObject, PhotoTexture, Placement, Pose
 from ..document.rig import Rig
+from ..document.settings import DeformSettings
 from ..raster import tiles
 from ..raster.picking import pick
 from ..raster.posed import PosedSplats, RestSplats
-from ..raster.reference_layers import Picture3D
+from ..raster.reference import Picture3D
 from ..raster.texture import TextureLevels
 from ..raster.tiles import Drawable
 from .deformer import Deformer

@@ -23,7 +23,7 @@ from .gaussians import Gaussians
 from .paint import Paint
 from .pose import UNHELD, Base, Handle, Pose
 from .rig import Rig
-from .settings import AS_IN_THE_PHOTO, Finish, Hint, Refined, Shadow
+from .settings import AS_IN_THE_PHOTO, DeformSettings, Finish, Hint, Refined, Shadow
 from .sides import FurtherView, Sides
 
 
@@ -311,18 +311,6 @@ class Placement:
         motion[:3, :3] = linear
         motion[:3, 3] = target - linear @ centre
         return motion
-
-
-@dataclass(frozen=True, eq=False)
-class DeformSettings:
-    """Settings of the deformation. The defaults are ours; the others serve ablations."""
-
-    mode: str = "arap"  # or "laplacian"
-    links: str = "geodesic"  # or "euclidean"
-    is_faithful: bool = False  # the paper as printed: three iterations, Eq. 5
-    stiffness: float = 1.0  # x the usual radius within which control points are linked
-    stretch_limit: float | None = None  # x its length at rest: handles go no farther than that
-    is_splitting: bool = False  # Gaussians that are stretched far become several
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ def _rows(first: int, count: int) -> tuple[np.uint64, ...]:
 F_DEPTH, F_X, F_Y, F_PHOTO, FRONT = _rows(0, 5)
 SUMS = 4 * LAYERS
 
-# The sums of the layer that is being drawn; see `reference._Sums`. MAG, MATTES and SEES hold what
+# The sums of the layer that is being drawn; see `reference.Sums`. MAG, MATTES and SEES hold what
 # is missing to 1 or goes beyond it: nothing where the photo is carried along as it was.
 (
     TOTAL, BODIED, GX, GY, BGX, BGY, DEPTH, SHX, SHY, MAG, SEES, MATTES, SOLIDS, R, G, B,

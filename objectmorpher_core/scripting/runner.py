@@ -24,7 +24,6 @@ from ..document import edits
 from ..document.model import (
     GAUSSIANS,
     Click,
-    DeformSettings,
     Document,
     EditObject,
     LiftSettings,
@@ -33,7 +32,7 @@ from ..document.model import (
     Prompt,
 )
 from ..document.placement import is_in_place, set_seen_from, spun
-from ..document.settings import Hint, Shadow
+from ..document.settings import DeformSettings, Hint, Shadow
 from ..pictures.image import read_mask
 from ..raster.trust import SIGNS, trust_in
 from .background import LIGHT, LIGHT_LIFTERS, PlateAhead, PlateTask, ShadowCaster

@@ -24,7 +24,6 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import (
-    DeformSettings,
     EditObject,
     Handle,
     LiftedObject,
@@ -32,6 +31,7 @@ from objectmorpher_core.document.model import (
     Matte,
     Placement,
 )
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift.registration.imported import ImportTarget
 from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.splat_files import encode

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from objectmorpher.editor.opening import OpeningError
-from objectmorpher.worker.requests import JobError
-from objectmorpher.worker.threads import Chores
+from objectmorpher.worker.requests import Chores, JobError
 from objectmorpher_core.base.progress import Progress
 
 

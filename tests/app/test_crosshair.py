@@ -10,9 +10,9 @@ from editor_steps import CENTRE, wait_for_jobs
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.shortcuts import Shortcuts
 from objectmorpher.editor.view import ToolName
+from objectmorpher.gui.widgets.panes import Rect
 from objectmorpher.gui.window.input import Input
-from objectmorpher.gui.window.layout import Rect
-from objectmorpher.tools.pose_strokes import DEPTH_STEP
+from objectmorpher.tools.pose_tool import DEPTH_STEP
 from objectmorpher_core.document.model import Document
 
 

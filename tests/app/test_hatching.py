@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher.gui.overlay.rig import hatch
+from objectmorpher.gui.overlay.pose import hatch
 
 
 @pytest.mark.parametrize("angle", [0.0, 45.0, -60.0])

@@ -11,7 +11,7 @@ from color_vision import MATRICES, SIGHTS, difference, lab
 from objectmorpher.canvas.painter import DEPTH_STOPS, STRAIN_STOPS
 from objectmorpher.gui.overlay.canvas import ACCENT, WARM, WHITE
 from objectmorpher.gui.overlay.place import COLOURS
-from objectmorpher.gui.overlay.rig import HATCHES, YELLOW
+from objectmorpher.gui.overlay.pose import HATCHES, YELLOW
 from objectmorpher.gui.widgets.theme import PALETTES, rgb
 from objectmorpher.gui.window.scenes import INPAINTED, LIFTED, REFINED
 from tests.tree import over

@@ -14,7 +14,8 @@ from objectmorpher.canvas.shape import CanvasShape, build_shape, rehearse
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ViewState
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import DeformSettings, Document
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.session.file import save_session
 
 

@@ -16,7 +16,7 @@ from objectmorpher.commands import run, why_not
 from objectmorpher.editor.autosave import recovery_root
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
-from objectmorpher.editor.tab import Tab
+from objectmorpher.editor.state import Tab
 from objectmorpher.editor.view import Shown, ToolName
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session

@@ -7,16 +7,9 @@ import pytest
 
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
-from objectmorpher_core.document.model import (
-    BesidePrompt,
-    Click,
-    DeformSettings,
-    Document,
-    Placement,
-    Pose,
-    Prompt,
-)
+from objectmorpher_core.document.model import BesidePrompt, Click, Document, Placement, Pose, Prompt
 from objectmorpher_core.document.rig import Rig, Seam
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.segment.mask_edit import feather, grow, shrink
 from tests import shapes
 

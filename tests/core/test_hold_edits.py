@@ -11,9 +11,10 @@ import pytest
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.hold_edits import Stays, hold, set_stays
-from objectmorpher_core.document.model import DeformSettings, Document, EditObject, Handle
+from objectmorpher_core.document.model import Document, EditObject, Handle
 from objectmorpher_core.document.pose import Pose
 from objectmorpher_core.document.rig import Rig
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 from tests.tree import quick

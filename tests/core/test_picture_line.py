@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher.tools.pose_strokes import along_line
+from objectmorpher.tools.pose_tool import along_line
 from objectmorpher_core.base.camera import Camera
 from tests.tree import over
 

@@ -8,7 +8,8 @@ import pytest
 
 from objectmorpher_core.deform.control_points import MIN_COUNT
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, Handle, Placement, Pose
+from objectmorpher_core.document.model import Handle, Placement, Pose
+from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 
 PIXEL = 1e-3  # px

@@ -14,7 +14,6 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import (
     Click,
-    DeformSettings,
     Document,
     EditObject,
     Handle,
@@ -28,7 +27,7 @@ from objectmorpher_core.document.model import (
     Prompt,
 )
 from objectmorpher_core.document.rig import Rig, Seam
-from objectmorpher_core.document.settings import Hint
+from objectmorpher_core.document.settings import DeformSettings, Hint
 from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
 from objectmorpher_core.session.file import (
     SessionError,

@@ -35,7 +35,7 @@ from .layer import (
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
     from objectmorpher_core.raster.posed import PosedSplats
-    from objectmorpher_core.raster.reference_layers import Picture3D
+    from objectmorpher_core.raster.reference import Picture3D
     from objectmorpher_core.raster.texture import TextureLevels
     from objectmorpher_core.raster.tiles import Drawable
 

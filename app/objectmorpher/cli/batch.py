@@ -26,9 +26,9 @@ from objectmorpher_core.scripting.script import (
     script_text,
 )
 
+from .command_parser import check_ray
 from .commands import check_outputs, edited_by, json_bytes
 from .idle_options import refuse_idle, said_on
-from .ray import check_ray
 from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
 USUAL_ENDING = ".png"  # of edits of photos in formats that are only read

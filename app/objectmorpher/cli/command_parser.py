@@ -9,12 +9,13 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from objectmorpher_core.base.quoting import meant, named
 
-from .terminal import PROGRAM
+from .terminal import PROGRAM, UsageError
 
 # Words of the command line that have options of their own.
 
@@ -173,3 +174,24 @@ def misspelt_command(arguments: Sequence[str], commands: Sequence[str]) -> str |
     if not suggestion and len(arguments) == 1:
         return None  # a file that is not there, which the window says
     return f"there is no command and no file {word}{suggestion or ': ' + ', '.join(commands)}"
+
+
+# `--ray ADDRESS`: the option of the commands whose work can be spread over many machines.
+
+NEEDED = ("ray", "pyarrow", "pandas")
+
+
+def add_ray(parser: argparse.ArgumentParser) -> None:
+    """The option."""
+    parser.add_argument(
+        "--ray", metavar="ADDRESS",
+        help="spread over a Ray cluster; local starts one here; default without Ray",
+    )  # fmt: skip
+
+
+def check_ray(options: argparse.Namespace) -> None:
+    """Raises UsageError where it is asked for and cannot be had."""
+    absent = [name for name in NEEDED if find_spec(name) is None]
+    if options.ray is not None and absent:
+        names = " and ".join(absent)
+        raise UsageError(f"--ray needs {names}: `pip install 'objectmorpher[cluster]'`")

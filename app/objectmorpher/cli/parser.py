@@ -23,6 +23,7 @@ from .command_parser import (
     RESEARCH,
     Parser,
     Subcommand,
+    add_ray,
     add_subcommands,
     completed_files,
     lazily,
@@ -30,7 +31,6 @@ from .command_parser import (
     research_commands,
 )
 from .options import RENDERERS, WindowOptions
-from .ray import add_ray
 from .terminal import FAILURES, PROGRAM, UsageError, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"

@@ -30,7 +30,7 @@ from objectmorpher_core.session.tree import SessionError
 from ..system.texts import t
 
 if TYPE_CHECKING:
-    from .tab import Tab
+    from .state import Tab
 
 
 class FileLock:

@@ -24,8 +24,7 @@ from .view import ToolName
 if TYPE_CHECKING:
     from .intents.exporting import Exporting
     from .intents.selection import Selection
-    from .state import EditorState
-    from .tab import Tab
+    from .state import EditorState, Tab
     from .tabs import Tabs
     from .tasks import Tasks
 

@@ -10,7 +10,7 @@ from objectmorpher_core.document.model import Document
 
 from ..canvas.shape import Shapes, build_ready
 from ..system.texts import t
-from .tab import Tab
+from .state import Tab
 
 if TYPE_CHECKING:
     from objectmorpher_core.lift.registration.other_photo import OtherPhoto

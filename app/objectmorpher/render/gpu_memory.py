@@ -1,13 +1,19 @@
-"""Arrays on the GPU, remembered by identity, and buffers that are refilled."""
+"""Arrays and pictures on the GPU, and buffers that are refilled."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, TypeVar
 
+import cv2
 import moderngl
 import numpy as np
 
+from objectmorpher_core.base.brush import Box
+
+from ..canvas.blend import CELL
+from .scene import Scene
 from .shaders import buffer_layout
 
 
@@ -114,3 +120,146 @@ class Instances:
             layout = buffer_layout(program, self._stream.buffer, self.columns, "/i")
             self._arrays[program.glo] = self._context.vertex_array(program, [layout])
         self._arrays[program.glo].render(moderngl.TRIANGLE_STRIP, 4, instances=self.count)
+
+
+# Pictures on the GPU, uploaded when the array is not the last one.
+
+SHARP_FROM = 4.0  # magnification from which single pixels are shown
+
+
+class PictureTexture:
+    """A picture of 1, 3 or 4 channels, 8 bits each on the GPU.
+
+    Of a picture that is shown much smaller than it is, a halved copy is uploaded.
+    """
+
+    def __init__(self, context: moderngl.Context, has_mipmaps: bool = True) -> None:
+        """Mipmaps are for what is shown smaller than it is."""
+        self._has_mipmaps = has_mipmaps
+        self._context = context
+        self._limit = int(context.info["GL_MAX_TEXTURE_SIZE"])
+        self._uploaded: np.ndarray | None = None
+        self._touched = 0  # of what is painted in place: boxes that are uploaded
+        self._is_changing = False
+        self._level = 0  # how often the current texture is halved
+        self._textures = {0: context.texture((1, 1), 1, b"\0")}  # by that
+        self._with_mipmaps: set[int] = set()  # of these
+
+    @property
+    def texture(self) -> moderngl.Texture:
+        return self._textures[self._level]
+
+    def upload(
+        self, pixels: np.ndarray | None, touched: Sequence[Box] = (), zoom: float = 1.0
+    ) -> None:
+        """`pixels` (h, w) or (h, w, channels): bool, u8, u16 or f32; None is one black px.
+
+        `touched`: of pixels (u8) that are painted in place, the boxes that changed, since they
+        were first shown and in this order. Only the new ones are uploaded. `zoom`: view px per px.
+        """
+        fresh, self._touched = touched[self._touched :], len(touched)
+        if pixels is not self._uploaded:
+            self._release()
+            self._uploaded, self._is_changing = pixels, bool(touched)
+        elif fresh:
+            self._is_changing = True
+            if list(self._textures) == [0] and pixels is not None:
+                self._refresh(pixels, fresh)
+            else:
+                self._release()
+        self._level = self._level_at(zoom)
+        if self._level not in self._textures:
+            shown = np.zeros((1, 1), np.uint8) if pixels is None else _as_u8(pixels)
+            self._textures[self._level] = self._made(_halved(shown, self._level))
+
+    def _level_at(self, zoom: float) -> int:
+        """The most halved copy that still has as many px as are shown."""
+        if self._uploaded is None:
+            return 0
+        longer = max(self._uploaded.shape[:2])
+        least = max(math.ceil(math.log2(longer / self._limit)), 0)  # for the GPU to take it
+        if self._is_changing or not self._has_mipmaps or zoom >= 1:
+            return least
+        return max(least, min(int(math.log2(1 / zoom)), int(math.log2(longer))))
+
+    def _made(self, shown: np.ndarray) -> moderngl.Texture:
+        height, width = shown.shape[:2]
+        channels = shown.size // (height * width)
+        data = np.ascontiguousarray(shown)
+        texture = self._context.texture((width, height), channels, data, alignment=1)
+        texture.repeat_x = texture.repeat_y = False
+        texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        return texture
+
+    def _refresh(self, pixels: np.ndarray, boxes: Sequence[Box]) -> None:
+        """The part around `boxes` once more. Mipmaps wait until the picture is another one."""
+        x0, y0 = min(b[0] for b in boxes), min(b[1] for b in boxes)
+        x1, y1 = max(b[2] for b in boxes), max(b[3] for b in boxes)
+        part = np.ascontiguousarray(pixels[y0:y1, x0:x1])
+        self._textures[0].write(part, viewport=(x0, y0, x1 - x0, y1 - y0), alignment=1)
+
+    def _release(self) -> None:
+        for texture in self._textures.values():
+            texture.release()
+        self._textures.clear()
+        self._with_mipmaps.clear()
+
+    @property
+    def glo(self) -> int:
+        """OpenGL's number of the texture."""
+        return self.texture.glo
+
+    def use(self, unit: int, zoom: float) -> None:
+        """Binds it: single pixels at high magnification, smooth below."""
+        above = moderngl.NEAREST if zoom >= SHARP_FROM else moderngl.LINEAR
+        below = above
+        # Where nothing is shrunk no mipmap is read; emulated, looking for one doubles the time.
+        if zoom < 1 and self._has_mipmaps and not self._is_changing:
+            below = moderngl.LINEAR_MIPMAP_LINEAR
+            if self._level not in self._with_mipmaps:
+                self._with_mipmaps.add(self._level)
+                self.texture.build_mipmaps()
+        self.texture.filter = (below, above)
+        self.texture.use(unit)
+
+
+def _halved(pixels: np.ndarray, times: int) -> np.ndarray:
+    for _ in range(times):
+        size = (max(pixels.shape[1] // 2, 1), max(pixels.shape[0] // 2, 1))
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    return pixels
+
+
+def _as_u8(pixels: np.ndarray) -> np.ndarray:
+    if pixels.dtype == np.uint16:
+        return (pixels >> 8).astype(np.uint8)
+    if pixels.dtype == np.bool_:
+        return pixels.view(np.uint8) * np.uint8(255)
+    if pixels.dtype == np.float32:
+        return (pixels * 255 + 0.5).astype(np.uint8)
+    return pixels
+
+
+# Where the edit is shown and where the photo, for the passes that ask.
+
+BLEND = 7  # texture unit, bound for all passes
+ALL = np.ones((1, 1), np.float32)  # the edit everywhere
+
+
+class BlendTexture:
+    """The scene's blend on the GPU."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._texture = PictureTexture(context, has_mipmaps=False)
+
+    def use(self, scene: Scene) -> None:
+        self._texture.upload(ALL if scene.blend is None else scene.blend)
+        self._texture.use(BLEND, 1.0)
+
+
+def blend_cells(scene: Scene) -> tuple[float, float]:
+    """Canvas px that the blend covers."""
+    if scene.blend is None:
+        return 1.0, 1.0
+    height, width = scene.blend.shape
+    return float(width * CELL), float(height * CELL)

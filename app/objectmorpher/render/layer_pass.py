@@ -12,10 +12,10 @@ from objectmorpher_core.document.bounds import MODES, NORMAL
 
 from ..canvas.layer import CanvasLayer
 from ..editor.view import ViewState
+from .gpu_memory import BLEND, blend_cells
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject
 from .shaders import Programs, set_uniforms
-from .textures import BLEND, blend_cells
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.grain import Grain

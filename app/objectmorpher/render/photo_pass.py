@@ -7,9 +7,9 @@ from typing import Any
 import moderngl
 
 from ..editor.view import ViewState
+from .gpu_memory import BLEND, PictureTexture, blend_cells
 from .scene import Hatch, Scene
 from .shaders import Programs, set_uniforms
-from .textures import BLEND, PictureTexture, blend_cells
 
 PHOTO, PLATE, MASK = range(3)  # texture units; BLEND is bound by the renderer
 _UNITS = {"photo": PHOTO, "plate": PLATE, "mask": MASK, "blend": BLEND}

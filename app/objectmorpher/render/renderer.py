@@ -16,11 +16,11 @@ from objectmorpher_core.document.bounds import NORMAL
 from ..canvas.layer import CanvasLayer
 from ..canvas.memo import same
 from ..editor.view import ViewState
+from .gpu_memory import BlendTexture, PictureTexture
 from .layer_pass import DefocusPass, LayerPass, photo_box
 from .photo_pass import PhotoPass
 from .scene import Colour, Scene, SplatObject
 from .shaders import Programs
-from .textures import BlendTexture, PictureTexture
 
 if TYPE_CHECKING:
     from .splat_pass import SplatPass, SplatPicture

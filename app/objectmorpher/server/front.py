@@ -36,8 +36,7 @@ from objectmorpher_core.base.progress import Cancelled
 from .. import __version__
 from .address import PROTOCOL, check_token, fingerprint
 from .message import MessageError, MissingError, decode, digest
-from .offers import told_offers
-from .running import Call, JobOutcome, Runner
+from .running import Call, JobOutcome, Runner, told_offers
 from .table import Table, types
 
 # An HTTP server for a few known users: one request per connection, a thread for each.

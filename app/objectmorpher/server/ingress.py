@@ -28,7 +28,7 @@ from .front import (
     announced,
     check_bearer,
 )
-from .offers import Offers
+from .running import Offers
 from .stages import Stages
 from .table import Table
 

@@ -18,7 +18,7 @@ from objectmorpher_core.model_sets import DRIVER, Card, need_of, this_card
 from objectmorpher_core.models import ModelError
 from objectmorpher_core.models.ledger import SPARE, Ledger, Model
 
-from .offers import Offers, look_at_offers
+from .running import Offers, look_at_offers
 
 ALSO = {"depth": "lift"}  # stages of models that work in another one
 FINEST = 1000  # parts of a GPU that are counted

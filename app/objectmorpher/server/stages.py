@@ -24,8 +24,7 @@ from objectmorpher_core.models import device
 from ..system.logs import show_log
 from ..worker import job_functions
 from ..worker.job_functions import PhotoMemory
-from .offers import Offers
-from .running import Call, JobOutcome, perform
+from .running import Call, JobOutcome, Offers, perform
 from .table import Served, Table
 
 log = logging.getLogger(__name__)

@@ -26,7 +26,7 @@ from ...base.kernel_files import numba
 from ...base.threads import EXACT, in_threads
 from ...raster import tiles
 from ...raster.posed import PosedSplats
-from ...raster.reference_layers import Picture3D
+from ...raster.reference import Picture3D
 from ...raster.rules import HALF, RULES, ZERO
 from ...raster.sampling import sample
 from ...raster.texture import TextureLevels, build_levels

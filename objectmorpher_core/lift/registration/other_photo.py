@@ -25,7 +25,7 @@ from ...document.sides import FurtherView
 from ...pictures.image import to_u8
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats
-from ...raster.reference_layers import Picture3D
+from ...raster.reference import Picture3D
 from ...raster.texture import build_levels
 from ...segment.mask_edit import is_selected
 from ...segment.matting.matte import cut_out

@@ -31,7 +31,7 @@ from ...document.model import LiftedObject, Matte, Placement
 from ...document.sides import Sides
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats, projection_jacobians
-from ...raster.reference_layers import Picture3D
+from ...raster.reference import Picture3D
 from ...raster.rules import RULES
 from ...raster.texture import build_levels
 from .canvas import bilinear

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document.model import DeformSettings, Handle, Pose
+from objectmorpher_core.document.model import Handle, Pose
+from objectmorpher_core.document.settings import DeformSettings
 
 from .bodies import even_sphere, five_limbs, limb_handles
 from .timing import ms, times

@@ -17,7 +17,6 @@ from objectmorpher_core.deform.control_points import COUNT, sample_control_point
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import (
-    DeformSettings,
     Handle,
     LiftedObject,
     LiftSettings,
@@ -25,6 +24,7 @@ from objectmorpher_core.document.model import (
     Placement,
     Pose,
 )
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels, build_levels

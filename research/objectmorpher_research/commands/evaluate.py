@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objectmorpher.cli.command_parser import Subcommand, add_subcommands
-from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.command_parser import Subcommand, add_ray, add_subcommands, check_ray
 from objectmorpher.cli.terminal import UsageError, progress_bar
 
 from .figures import cell, number, numbers

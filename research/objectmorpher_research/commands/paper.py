@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.command_parser import add_ray, check_ray
 from objectmorpher.cli.terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
 from .figures import Number, aligned, cell, number, numbers

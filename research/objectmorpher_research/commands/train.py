@@ -10,8 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from objectmorpher.cli.command_parser import Subcommand, add_subcommands
-from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.command_parser import Subcommand, add_ray, add_subcommands, check_ray
 from objectmorpher.cli.terminal import UsageError, progress_bar
 from objectmorpher_core.base.files import write_all
 

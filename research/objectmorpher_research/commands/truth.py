@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.command_parser import add_ray, check_ray
 from objectmorpher.cli.terminal import UsageError, progress_bar
 from objectmorpher_core.base.progress import Progress
 

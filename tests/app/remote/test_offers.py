@@ -12,7 +12,7 @@ from hands import PATIENCE
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import SERVER
 from objectmorpher.server.client import hello
-from objectmorpher.server.offers import Offer, look_at_offers, read_offers
+from objectmorpher.server.running import Offer, look_at_offers, read_offers
 from objectmorpher_core import compose, segment
 
 

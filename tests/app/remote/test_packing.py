@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from objectmorpher.editor.settings import STAGES
-from objectmorpher.server.offers import Offer
 from objectmorpher.server.packing import PackingError, Site, fit, packed
+from objectmorpher.server.running import Offer
 from objectmorpher_core.model_sets import DRIVER, Card, need_of
 from objectmorpher_core.models import hub_model
 from objectmorpher_core.models.ledger import Ledger, Model

@@ -14,7 +14,7 @@ from same_values import same_values
 from objectmorpher.server.address import ServerLost
 from objectmorpher.server.client import call
 from objectmorpher.server.fitting import is_sound
-from objectmorpher.server.offers import Offer
+from objectmorpher.server.running import Offer
 from objectmorpher.worker import job_functions
 from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.base.arrays import F32, RGB, frozen

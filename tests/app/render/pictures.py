@@ -13,7 +13,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Handle, Pose
 from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_core.raster.texture import TextureLevels
 from tests import shapes
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher.render.textures import PictureTexture
+from objectmorpher.render.gpu_memory import PictureTexture
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.segment.mask_edit import MaskPainting
 

@@ -15,8 +15,8 @@ from objectmorpher.editor.view import PoseMode, PoseView, ToolName
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.pose_tool import PoseTool
 from objectmorpher_core.base.brush import Brush
-from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.settings import Rigidity, rigidity_of
 from strokes import press, stroke
 
 RADIUS = 8.0  # px, of the brush

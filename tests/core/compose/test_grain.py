@@ -15,7 +15,8 @@ from objectmorpher_core.compose.light.grain import Grain, find_grain, sketch_gra
 from objectmorpher_core.compose.light.noise import BANDS, TILE, Noise, find_noise
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import DeformSettings, Document, Placement
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
 from tests.tree import quick

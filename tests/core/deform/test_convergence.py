@@ -8,7 +8,7 @@ import pytest
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.arap import ArapSolver, iterate, minimise
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document.model import DeformSettings
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_research.bench.bodies import five_limbs, limb_handles
 from objectmorpher_research.bench.deform import BEND
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from objectmorpher.editor.intents.rigging import sides_of_cut
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document.model import DeformSettings
 from objectmorpher_core.document.rig import Rig, Seam
+from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 
 BAR = shapes.capsule()

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.deformer import ANCHORED_SHARE, Deformer
-from objectmorpher_core.document.model import DeformSettings, Handle
+from objectmorpher_core.document.model import Handle
 from objectmorpher_core.document.pose import UNHELD
+from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 
 F64 = 1e-9

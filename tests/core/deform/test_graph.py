@@ -13,8 +13,8 @@ from objectmorpher_core.deform.graph import (
     ControlGraph,
     build_graph,
 )
-from objectmorpher_core.document.model import DeformSettings
 from objectmorpher_core.document.rig import Seam
+from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 from tests.tree import over
 

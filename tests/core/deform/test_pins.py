@@ -10,8 +10,9 @@ import pytest
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import DeformSettings, Document, Handle, Pose
+from objectmorpher_core.document.model import Document, Handle, Pose
 from objectmorpher_core.document.pose import turn_at
+from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 
 BAR = shapes.capsule()

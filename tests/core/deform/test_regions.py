@@ -7,9 +7,10 @@ import pytest
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document.model import DeformSettings, Handle, LiftedObject, Pose
+from objectmorpher_core.document.model import Handle, LiftedObject, Pose
 from objectmorpher_core.document.pose import Base
 from objectmorpher_core.document.rig import Rig, Seam
+from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 from tests.tree import over
 

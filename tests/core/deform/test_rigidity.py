@@ -7,8 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of, with_rigidity
-from objectmorpher_core.document.model import DeformSettings, Handle, LiftedObject
+from objectmorpher_core.document.model import Handle, LiftedObject
+from objectmorpher_core.document.settings import (
+    DeformSettings,
+    Rigidity,
+    rigidity_of,
+    with_rigidity,
+)
 from tests import shapes
 
 SOFT_TO_RIGID = (Rigidity.SOFT, Rigidity.NORMAL, Rigidity.RIGID)

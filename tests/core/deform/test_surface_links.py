@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.graph import LINK_RADIUS, ControlGraph, SolidSurface, build_graph
-from objectmorpher_core.document.model import DeformSettings
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_research.bench.bodies import five_limbs
 from tests import shapes
 from tests.tree import over, quick

@@ -10,7 +10,8 @@ import pytest
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document.model import DeformSettings, Handle, Pose
+from objectmorpher_core.document.model import Handle, Pose
+from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 
 EXACT = 1e-9

@@ -25,7 +25,7 @@ from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_core.raster.trust import trust_in
 from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_core.session.file import decode_session, encode_session

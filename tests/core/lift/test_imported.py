@@ -13,7 +13,6 @@ from objectmorpher_core.compose.composite import composite, object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import (
-    DeformSettings,
     Document,
     EditObject,
     LiftedObject,
@@ -21,12 +20,13 @@ from objectmorpher_core.document.model import (
     Photo,
     Placement,
 )
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.registration.imported import lift_imported
 from objectmorpher_core.lift.registration.placement import Proposal, Registrar
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import export
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
 from tests.core.lift import registered

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, LiftedObject, LiftSettings, Placement
+from objectmorpher_core.document.model import LiftedObject, LiftSettings, Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.pipeline import lift_mask

@@ -11,12 +11,13 @@ from scipy.spatial import KDTree
 
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.model import DeformSettings, LiftedObject, Placement
+from objectmorpher_core.document.model import LiftedObject, Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.lift.relief.sides import with_sides
 from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.posed import RestSplats
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_core.raster.rules import RULES
 from objectmorpher_core.raster.texture import sample_texture
 from objectmorpher_core.raster.trust import trust_in

@@ -11,7 +11,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
-from objectmorpher_core.raster.reference_layers import ReferenceComposite, Sums
+from objectmorpher_core.raster.reference import ReferenceComposite, Sums
 from objectmorpher_core.raster.rules import RULES, SPLATTINGS, coverage, facing_weight, ramp
 from objectmorpher_core.raster.texture import TextureLevels, build_levels, sample_texture
 from tests import shapes

@@ -8,7 +8,8 @@ import pytest
 
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.deform.resampling import thinned
-from objectmorpher_core.document.model import DeformSettings, Placement
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.sharpening import sharpen
 from tests import shapes

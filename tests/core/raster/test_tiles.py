@@ -14,7 +14,7 @@ from objectmorpher_core.deform.skinning import Skinned
 from objectmorpher_core.document.model import PhotoTexture, Placement
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_core.raster.rules import RULES
 from objectmorpher_core.raster.texture import TextureLevels, build_levels, sample_texture
 from tests import shapes

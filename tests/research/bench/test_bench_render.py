@@ -13,7 +13,7 @@ import pytest
 from objectmorpher.cli import parser as cli
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import tiles
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_research.bench import gl
 from objectmorpher_research.bench.classic_gl import ClassicViewer
 from objectmorpher_research.bench.render import tiles_frame

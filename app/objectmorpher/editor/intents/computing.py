@@ -17,7 +17,7 @@ from ..view import Action
 
 if TYPE_CHECKING:
     from ...server.address import Server
-    from ...server.offers import Offers
+    from ...server.running import Offers
     from ..state import EditorState
     from ..tasks import Tasks
 
@@ -81,7 +81,7 @@ class Computing:
     def ask_offers(self, done: Callable[[Offers], None]) -> None:
         """Ask the server for its backends; a server that does not answer counts as lost."""
         from ...server.client import hello
-        from ...server.offers import read_offers
+        from ...server.running import read_offers
 
         server = self.reached
         if server is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.doctor import StageReport
 
     from ...server.address import Server
-    from ...server.offers import Offer, Offers
+    from ...server.running import Offer, Offers
     from ..state import EditorState
     from ..tasks import Tasks
     from .computing import Computing

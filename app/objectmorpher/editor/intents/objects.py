@@ -22,8 +22,7 @@ from ..view import USUAL_LEVEL, Action, ToolName
 from .composing import USUAL_SHADOW
 
 if TYPE_CHECKING:
-    from ..state import EditorState
-    from ..tab import Tab
+    from ..state import EditorState, Tab
     from ..tabs import Tabs
     from .posing import Posing
 

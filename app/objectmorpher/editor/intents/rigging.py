@@ -13,13 +13,12 @@ from objectmorpher_core.base.arrays import F64, I32, Mask
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document
 from objectmorpher_core.document.rig import Rig
+from objectmorpher_core.document.settings import Rigidity, with_rigidity
 
 from ...system.texts import t
 from ..view import PoseMode
 
 if TYPE_CHECKING:
-    from objectmorpher_core.deform.rigidity import Rigidity
-
     from ..state import EditorState
 
 
@@ -177,8 +176,6 @@ class Rigging:
 
     def set_rigidity(self, rigidity: Rigidity) -> None:
         """Set the material of the whole object."""
-        from objectmorpher_core.deform.rigidity import with_rigidity
-
         editor = self._editor
         if editor.object is None:
             return

@@ -11,15 +11,14 @@ from PIL import Image
 from ...commands import run
 from ...editor.editor import Editor
 from ...editor.recovery import Left, when
+from ...render.gpu_memory import PictureTexture
 from ...render.renderer import Renderer
-from ...render.textures import PictureTexture
 from ...system.resources import resource
 from ...system.texts import t
-from ..widgets.panes import FLAGS, START
+from ..widgets.panes import FLAGS, START, Rect
 from ..widgets.theme import FIELD, TITLE_SIZE, Icon, theme
 from ..widgets.widgets import Emphasis, bold_text, button, drawn_button, fitted, small_text, tooltip
 from ..window.landmarks import mark
-from ..window.layout import Rect
 
 SAMPLES = {  # title, and a place of the thing that is lifted when it is opened, image px
     "chelsea": ("Cat", (189, 153)), "coffee": ("Coffee", (280, 260)),

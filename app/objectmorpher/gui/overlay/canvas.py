@@ -8,8 +8,8 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ...editor.editor import Editor
+from ..widgets.panes import Rect
 from ..widgets.theme import theme
-from ..window.layout import Rect
 
 DARK = "#0B0C0E"
 WHITE = "#FFFFFF"

@@ -13,9 +13,9 @@ from ...editor.editor import Editor
 from ...editor.view import Shown
 from ...render.scene import Hatch
 from ...system.texts import t
+from ..widgets.panes import Rect
 from ..widgets.theme import theme
 from ..widgets.widgets import bold_text, small_text
-from ..window.layout import Rect
 from ..window.scenes import INPAINTED, LIFTED, REFINED
 
 WIDTH = 216.0  # points

@@ -11,7 +11,7 @@ from ...editor.editor import Editor
 from ...editor.history import History, Step
 from ...editor.view import CHANGING, ToolName
 from ...system.texts import t
-from ..widgets.panes import INSPECTOR, edge, pane
+from ..widgets.panes import INSPECTOR, Rect, edge, pane
 from ..widgets.theme import FOLDED, PRIMARY, Icon, theme
 from ..widgets.widgets import (
     FIELD,
@@ -29,7 +29,6 @@ from ..widgets.widgets import (
     text_top,
 )
 from ..window.landmarks import mark
-from ..window.layout import Rect
 from .compose import draw_compose
 from .look import draw_look
 from .object_list import draw_objects

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, imgui
 from ...commands import COMMANDS, keys_of, run, why_not
 from ...editor.editor import Editor
 from ...system.texts import t
+from ..widgets.panes import has_panel
 from ..widgets.theme import SMALL_SIZE, Icon, theme
 from ..widgets.widgets import (
     Emphasis,
@@ -23,7 +24,6 @@ from ..widgets.widgets import (
     text_top,
 )
 from ..window.landmarks import mark
-from ..window.layout import has_panel
 
 ROW = 32.0  # points
 BETWEEN = 12.0  # points from a row to the next

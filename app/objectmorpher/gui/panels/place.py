@@ -26,7 +26,7 @@ from ..widgets.widgets import (
     tooltip,
 )
 from ..window.landmarks import mark
-from .animation import draw_timeline
+from .pose import draw_timeline
 
 RESET = 24.0  # points, side of the button that resets a group
 DEPTHS = (-1.5, 3.0)  # object diameters, ends of the slider

@@ -14,8 +14,8 @@ from imgui_bundle import ImVec2, imgui
 
 from ...commands import COMMANDS, run, why_not
 from ...editor.editor import Editor
+from ...render.gpu_memory import PictureTexture
 from ...render.renderer import Renderer
-from ...render.textures import PictureTexture
 from ...system.texts import t
 from ...tools.pointer import SNAP
 from ..window.landmarks import mark

@@ -19,14 +19,13 @@ from ...editor.view import CHANGING, Hover, ToolName
 from ...system.texts import t
 from ...tools import navigate
 from ...tools.pointer import Button, Pointer, PointerShape
-from ...tools.pose_strokes import DEPTH_STEP
+from ...tools.pose_tool import DEPTH_STEP
 from ...tools.registry import TOOLS, Tool
 from ..overlay.canvas import DARK, WHITE, CanvasPainter
-from ..widgets.panes import INSPECTOR, START, STATUS, TABS
+from ..widgets.panes import INSPECTOR, START, STATUS, TABS, Rect
 from ..widgets.panes import TOOLS as TOOL_STRIP
 from ..widgets.theme import theme
 from .landmarks import mark_on_canvas
-from .layout import Rect
 
 # Buttons and fields by keyboard: which part of the window has the keys, the photo or a panel.
 

@@ -11,11 +11,10 @@ from ...editor.editor import Editor
 from ...editor.view import Shown, ToolName
 from ...system.texts import t
 from ..widgets import panes
-from ..widgets.panes import edge, pane
+from ..widgets.panes import Rect, edge, pane
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import fitted, icon_button, tooltip
 from .landmarks import mark
-from .layout import Rect
 
 # The tool strip at the left.
 

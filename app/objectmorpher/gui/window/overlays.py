@@ -19,10 +19,10 @@ from ..overlay.look import draw_comparison, draw_look, draw_pixel_grid
 from ..overlay.place import draw_frame
 from ..overlay.pose import draw_control_points, draw_pose
 from ..overlay.select import draw_left_out, draw_mask, draw_selection
+from ..widgets.panes import Rect
 from ..widgets.theme import theme
 from ..widgets.widgets import Emphasis, bold_text, button
 from .landmarks import mark, mark_on_canvas
-from .layout import Rect
 
 DRAWN: dict[ToolName, Callable[[CanvasPainter], None]] = {
     ToolName.SELECT: draw_selection,

@@ -12,11 +12,10 @@ from ...editor.view import StatusMessage
 from ...system.report import without_names
 from ...system.texts import t
 from ...worker.requests import Executor, Request
-from ..widgets.panes import STATUS, edge, fades, pane
+from ..widgets.panes import STATUS, Rect, edge, fades, pane
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import icon_button, small_text, tooltip
 from .landmarks import mark
-from .layout import Rect
 
 JOB_DELAY = 0.15  # s; a job that is faster shows no bar
 BAR = 120.0  # points

@@ -8,14 +8,13 @@ from imgui_bundle import ImVec2, imgui
 
 from ...commands import COMMANDS, keys_of, run
 from ...editor.editor import Editor
-from ...editor.tab import Tab
+from ...editor.state import Tab
 from ...editor.view import ToolName
 from ...system.texts import t
-from ..widgets.panes import TABS, edge, pane
+from ..widgets.panes import TABS, Rect, edge, pane
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import drawn_button, fitted, icon_button, small_text, tooltip
 from .landmarks import mark
-from .layout import Rect
 
 WIDEST = 220.0  # points, of a tab; many are narrower, so that all are there
 CROSS = 24.0  # points, of a tab's close button

@@ -34,13 +34,12 @@ from ..dialogs.popups import Popups
 from ..dialogs.start import StartScreen
 from ..panels.inspector import draw_inspector
 from ..widgets import theme as looks
-from ..widgets.panes import fades
+from ..widgets.panes import Layout, Rect, fades, has_panel, lay_out
 from ..widgets.theme import theme
 from ..widgets.widgets import pictures
 from . import landmarks
 from .input import HELP, Input
 from .landmarks import FrameLog
-from .layout import Layout, Rect, has_panel, lay_out
 from .menu import draw_menu, draw_toolbar
 from .overlays import draw_overlays
 from .scenes import build_scene

@@ -19,7 +19,6 @@ from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.bounds import LEAST_THICKNESS
 from objectmorpher_core.document.model import (
-    DeformSettings,
     Document,
     LiftedObject,
     LiftSettings,
@@ -29,7 +28,7 @@ from objectmorpher_core.document.model import (
     Pose,
     Prompt,
 )
-from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.settings import DeformSettings, Shadow
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, open_photo
 from objectmorpher_core.scripting.options import EditScript

@@ -30,7 +30,7 @@ from objectmorpher_core.pictures.image import ImageError, at_most, read_mask, to
 from objectmorpher_core.pipeline import cut_front, lift_mask, make_plate, read_photo
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
-from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_core.segment import SelectionError
 
 from . import TrainingError, pose_sources
