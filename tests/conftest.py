@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: ARCHITECTURE section 8
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # those of PyTorch wait busily for each other
 
 import numpy as np

@@ -142,3 +142,12 @@ def _enlarged(keys, firsts):
             other = _slot(more, heads, keys[slot])
             more[other], heads[other] = keys[slot], firsts[slot]
     return more, heads
+
+
+def scattered(expected: F64, rng: np.random.Generator) -> F64:
+    """(N, 2) x, y of random points from a grid's corner on, `expected` (h, w) of them per cell."""
+    counts = np.floor(expected + rng.random(expected.shape)).astype(int)
+    rows, columns = np.nonzero(counts)
+    repeat = counts[rows, columns]
+    cells = np.column_stack([np.repeat(columns, repeat), np.repeat(rows, repeat)])
+    return cells + rng.random((len(cells), 2))

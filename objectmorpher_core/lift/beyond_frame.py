@@ -40,7 +40,7 @@ def cut_out_beyond(pixels: Pixels, mask: Selection, mixed: Mask | None = None) -
     return with_beyond(cut_out(pixels, mask, mixed), (width, height))
 
 
-def with_beyond(matte: Matte, size: tuple[int, int], seed: int = 0) -> Matte:
+def with_beyond(matte: Matte, size: tuple[int, int]) -> Matte:
     """Return `matte` with colours made for what of it is beyond a photo of `size` (w, h) px."""
     x0, y0, x1, y1 = matte.box
     depth = float(max(-x0, -y0, x1 - size[0], y1 - size[1]))
@@ -55,7 +55,7 @@ def with_beyond(matte: Matte, size: tuple[int, int], seed: int = 0) -> Matte:
     near = (away < AROUND * depth) & shown
     rows, columns = np.flatnonzero(near.any(1)), np.flatnonzero(near.any(0))
     window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    made = _filled(matte.foreground[window], matte.alpha[window], beyond[window], depth, seed)
+    made = _filled(matte.foreground[window], matte.alpha[window], beyond[window], depth)
     if made is None:
         return matte
     foreground, there = matte.foreground.copy(), beyond[window]
@@ -63,7 +63,7 @@ def with_beyond(matte: Matte, size: tuple[int, int], seed: int = 0) -> Matte:
     return replace(matte, foreground=foreground)
 
 
-def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float, seed: int) -> U8 | None:
+def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float) -> U8 | None:
     """(h, w, 3) `foreground` with what is `beyond` the frame (h, w) filled, or None.
 
     `depth` is how far the object goes on there, px.
@@ -96,6 +96,6 @@ def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float, seed: int) 
     guess = 0.5 * (mirrored + smooth(small, (~hole).astype(np.float32)))
     coarse = np.asarray(cv2.GaussianBlur(guess, (0, 0), COARSE), np.float32)
     tone = PatchTone(coarse, np.ones(hole.shape, np.float32))
-    completion = complete(small, known, Guide(unlikely, tone=tone), seed, silent)
+    completion = complete(small, known, Guide(unlikely, tone=tone), 0, silent)
     colors = np.clip(completion.colors, 0, 255).astype(np.float32)
     return np.asarray(with_detail(crop, beyond, colors, completion.sources), np.uint8)

@@ -1,4 +1,4 @@
-"""Undo: a list of documents and a cursor (ARCHITECTURE section 4).
+"""Undo: a list of documents and a cursor.
 
 Documents share what did not change, so a step costs what is new in it: kilobytes for a drag,
 hundreds of megabytes for the lift of a large object. The oldest steps go when there are too many

@@ -87,6 +87,11 @@ class ServedError(ValueError):
     """The server ran the job, and the job failed as it would have here; one sentence."""
 
 
+def url_at(host: str, port: int) -> str:
+    """Return the URL of a server of ours."""
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+
+
 @dataclass(frozen=True)
 class Address:
     """The address of a server."""

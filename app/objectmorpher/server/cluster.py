@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..editor.settings import STAGES
-from .address import check_token
+from .address import check_token, url_at
 from .front import IDLE, RequestLimits
 from .packing import Packing, PackingError, Site, gpu_count, look_there, packed
 from .table import Table
@@ -77,8 +77,7 @@ class Cluster:
     @property
     def url(self) -> str:
         """Return the URL that a client takes."""
-        host, port = self.address
-        return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+        return url_at(*self.address)
 
     def close(self) -> None:
         """Ends the stages, and the cluster if it was started here."""

@@ -34,7 +34,7 @@ from objectmorpher_core.base.limits import WAITING_JOBS as MOST_JOBS
 from objectmorpher_core.base.progress import Cancelled
 
 from .. import __version__
-from .address import PROTOCOL, check_token, fingerprint
+from .address import PROTOCOL, check_token, fingerprint, url_at
 from .message import MessageError, MissingError, decode, digest
 from .running import Call, JobOutcome, Runner, told_offers
 from .table import Table, types
@@ -78,8 +78,7 @@ class HttpServer:
     @property
     def url(self) -> str:
         """Return the URL that a browser takes."""
-        host, port = self.address
-        return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
+        return url_at(*self.address)
 
     def start(self) -> None:
         """Serves from another thread."""

@@ -38,7 +38,6 @@ import numpy as np
 
 from objectmorpher_core import pipeline, segment
 from objectmorpher_core.base import quoting
-from objectmorpher_core.base.limits import CONNECTIONS
 from objectmorpher_core.base.progress import Cancelled, Progress, part
 from objectmorpher_core.base.rotations import matrices_from_quats
 from objectmorpher_core.document import edits
@@ -252,15 +251,13 @@ def _points(said: Any, size: tuple[int, int]) -> list[tuple[float, float]]:
 class WebServer(HttpServer):
     """Serves the editor to the browsers of whoever has the token."""
 
-    def __init__(
-        self, address: tuple[str, int], token: str, most: int, connections: int = CONNECTIONS
-    ) -> None:
+    def __init__(self, address: tuple[str, int], token: str, most: int) -> None:
         """`most`: bytes of a photo. Raises OSError where the address is taken, TokenError."""
         self.token, self.most = check_token(token), most
         self.edits: Kept[WebEdit] = Kept(MOST_EDITS, lambda edit: 1)
         self.turn = threading.Lock()  # of the one computation that runs
         self.samples = {p.name: p for p in sorted(resource("assets/samples").glob("*.jpg"))}
-        super().__init__(address, partial(_WebHandler, self), connections)
+        super().__init__(address, partial(_WebHandler, self))
 
     def add(self, edit: WebEdit) -> str:
         """Keep an edit, and return the name that only its owner knows."""

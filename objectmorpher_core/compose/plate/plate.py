@@ -19,9 +19,8 @@ from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint
 from .. import Inpainter, InpaintError, LooksFar, TakesHints
+from ..blend import Box, distance
 from .residue import Ghost, find_ghosts, find_residue, shown_shares, visible_residue, with_ghosts
-
-Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
 HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the object
 MIN_HOLE_MARGIN = 4.0  # px
@@ -72,7 +71,7 @@ def build_plate(
     height, width = covered.shape
     margin = hole_margin(width, height)
     residue = find_residue(pixels, covered, margin)
-    away = _away(covered | residue)
+    away = distance(covered | residue)
     hole = away < margin
     rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
     box = (int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
@@ -89,7 +88,7 @@ def build_plate(
     fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
     if residue.any():
         residue[inner] = visible_residue(residue[inner], photo, fill)
-        away = _away(covered | residue)
+        away = distance(covered | residue)
     weight = fill_weight(away[inner].copy(), margin)
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true
@@ -122,12 +121,6 @@ def _window(
         context = max(width, height)
     top, left = max(y0 - context, 0), max(x0 - context, 0)
     return (slice(top, min(y1 + context, height)), slice(left, min(x1 + context, width))), left, top
-
-
-def _away(covered: Mask) -> F32:
-    """(H, W) px to the nearest pixel that is covered."""
-    px = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.asarray(px, np.float32)
 
 
 def fill_weight(away: F32, margin: float) -> F32:
@@ -190,7 +183,7 @@ def plate_of_holes(
     covered = np.zeros(plate.hole.shape, bool)
     for matte in holes:
         covered |= crop(matte.alpha, matte.box, plate.box) > 0
-    is_shown, painted = _away(covered) < near, plate.painted
+    is_shown, painted = distance(covered) < near, plate.painted
     if painted is not None:
         painted = painted.copy()
         for item in rest:

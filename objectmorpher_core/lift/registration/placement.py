@@ -274,9 +274,9 @@ class Registrar:
         self._views = tuple(target.view(level.size) for level in LEVELS)
         self._matches = None if matches is None else matches.moved(self._frame)
 
-    def rated(self, world_from_object: F64, focal: float | None = None) -> Proposal:
+    def rated(self, world_from_object: F64) -> Proposal:
         """A pose that was chosen by hand, and how well it agrees: some milliseconds."""
-        return self._proposal(self._rated(self._stance(world_from_object, focal)))
+        return self._proposal(self._rated(self._stance(world_from_object)))
 
     def improved(self, proposal: Proposal, is_focal_free: bool = False) -> Proposal:
         """The best pose near `proposal`; the same one where nothing near is better."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask, crop
 from ...base.camera import Camera
-from ...base.poisson_disk import distance_inside, thin_to_spacing
+from ...base.poisson_disk import distance_inside, scattered, thin_to_spacing
 from ...document.model import LiftedObject, Matte
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats
@@ -152,11 +152,7 @@ def brim_around(
     ring = beyond & ~covered & near if missed.any() else np.zeros_like(covered)
     step = spacing_px * np.sqrt(PACKING)
     expected = np.where(ring, OVERSAMPLING / max(spacing_px, 1.0) ** 2, 0.0)
-    counts = np.floor(expected + rng.random(expected.shape)).astype(int)
-    rows, columns = np.nonzero(counts)
-    repeat = counts[rows, columns]
-    cells = np.column_stack([np.repeat(columns, repeat), np.repeat(rows, repeat)])
-    xy = cells + rng.random((len(cells), 2))
+    xy = scattered(expected, rng)
     if len(xy):
         flat = np.column_stack([xy, np.zeros(len(xy))])
         xy = xy[thin_to_spacing(flat, max(step, 0.8), rng.permutation(len(xy)))]

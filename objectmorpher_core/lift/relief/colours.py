@@ -168,7 +168,7 @@ GUIDE = 1.0  # weight of their difference beside that of the patches
 REACH = 2  # px: a patch is 2 REACH + 1 wide
 
 
-def grown(rgb: F32, source: Mask, hole: Mask, seed: int = 0) -> F32:
+def grown(rgb: F32, source: Mask, hole: Mask) -> F32:
     """`rgb` (h, w, 3) with `hole` (h, w) filled from `source` (h, w).
 
     What `rgb` is in the hole is what it grows from. All else stays. The hole stays as it is where
@@ -183,7 +183,7 @@ def grown(rgb: F32, source: Mask, hole: Mask, seed: int = 0) -> F32:
             break
         levels.append(smaller)
         source = smaller[1]
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     rows, columns = np.nonzero(source)
     chosen = rng.integers(0, len(rows), source.shape)
     places = np.stack([rows[chosen], columns[chosen]], -1)

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import KDTree
 
 from ...base.arrays import F64, Mask
-from ...base.poisson_disk import thin_to_spacing
+from ...base.poisson_disk import scattered, thin_to_spacing
 from ...base.threads import in_threads
 from ...document.model import Matte
 from .body import BACK, FRONT, MIDDLE, ReliefBody
@@ -209,11 +209,7 @@ def _area(body: ReliefBody, side: float) -> F64:
 
 def _draw(outline: ReliefSilhouette, expected: F64, rng: np.random.Generator) -> F64:
     """Photo px (N, 2) of random points, `expected` (h, w) of them per cell."""
-    counts = np.floor(expected + rng.random(expected.shape)).astype(int)
-    rows, columns = np.nonzero(counts)
-    repeat = counts[rows, columns]
-    cells = np.column_stack([np.repeat(columns, repeat), np.repeat(rows, repeat)])
-    return outline.photo_xy(cells + rng.random((len(cells), 2)) - 0.5)
+    return outline.photo_xy(scattered(expected, rng) - 0.5)
 
 
 def _is_within(xy: F64, lines: list[RimLine], outline: ReliefSilhouette, depth: float) -> Mask:

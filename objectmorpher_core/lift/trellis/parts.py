@@ -221,15 +221,3 @@ def refuse_differences(
     for key, shape in wanted.items():
         if found[key] != shape:
             raise LiftError(f"in the weights {name} {key} is {found[key]}, expected {shape}")
-
-
-def save_part(part: NetworkPart, description: dict[str, Any], path: Path) -> None:
-    """Writes what `load_part` reads."""
-    import json
-
-    from safetensors.torch import save_file
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    tensors: dict[str, Tensor] = {k: t.contiguous() for k, t in part.state_dict().items()}
-    save_file(tensors, str(path.with_name(path.name + ".safetensors")))
-    path.with_name(path.name + ".json").write_text(json.dumps(description), encoding="utf-8")

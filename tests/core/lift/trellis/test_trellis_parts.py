@@ -16,7 +16,7 @@ from transformers import Dinov2WithRegistersModel
 
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.trellis.configs import part_path, pipeline
-from objectmorpher_core.lift.trellis.parts import build, load_part, save_part
+from objectmorpher_core.lift.trellis.parts import build, load_part
 from objectmorpher_core.lift.trellis.picture import MEAN, STD, Encoder
 from tests.core.lift.trellis import tiny_trellis
 
@@ -28,7 +28,7 @@ ROLE = "slat_decoder_gs"
 def saved(tmp_path):
     torch.manual_seed(0)
     part = build(tiny_trellis.description(ROLE))
-    save_part(part, tiny_trellis.description(ROLE), tmp_path / "part")
+    tiny_trellis.save_part(part, tiny_trellis.description(ROLE), tmp_path / "part")
     return part, tmp_path / "part"
 
 

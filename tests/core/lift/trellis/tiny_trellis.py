@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from safetensors.torch import save_file
 from transformers import Dinov2WithRegistersConfig, Dinov2WithRegistersModel
 
 from objectmorpher_core.lift.trellis.generator import Folders
-from objectmorpher_core.lift.trellis.parts import build, save_part
+from objectmorpher_core.lift.trellis.parts import NetworkPart, build
 from objectmorpher_core.models.plans import Plan
 
 WIDTH = 24  # channels of the picture's tokens
@@ -107,3 +108,11 @@ def write(folder: Path) -> Folders:
         write_model(folder / "trellis-image-large"),
         write_encoder(folder / "dinov2-with-registers-large"),
     )
+
+
+def save_part(part: NetworkPart, description: dict[str, Any], path: Path) -> None:
+    """Writes what `load_part` reads."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    tensors = {name: values.contiguous() for name, values in part.state_dict().items()}
+    save_file(tensors, str(path.with_name(path.name + ".safetensors")))
+    path.with_name(path.name + ".json").write_text(json.dumps(description), encoding="utf-8")
