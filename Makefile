@@ -63,7 +63,15 @@ BESIDE := 'torchmetrics>=1.6' # others' measures, to compare ours with
 test-models: .make/models
 	@$(COMPILE)
 	@$(KERNELS)
-	$(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '[^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart' tests --include='test_*.py' | sort)
+	$(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '$(LEARNED)' tests --include='test_*.py' | sort)
+
+# What `make test` leaves out: the slow tests, and what PyTorch, Ray or a browser is needed for.
+.PHONY: test-rest
+LEARNED := [^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart
+test-rest: .make/test
+	@$(COMPILE)
+	@$(KERNELS)
+	$(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE 'mark\.slow|quick\(|browser|$(LEARNED)' tests --include='test_*.py' | sort)
 
 .make/models: .make/test
 	@$(PIP) install -q '$(TORCH)' $(BESIDE) -e '.[dev,models,research,cluster]' -e research

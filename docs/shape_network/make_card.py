@@ -16,10 +16,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from objectmorpher_core.lift.crop import Crop, planes_of
+from objectmorpher_core.lift.crop import Crop
 from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeModel
 from objectmorpher_core.models import registry
-from objectmorpher_core.segment import dino_tokens
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
 
 FOLDER = Path(__file__).resolve().parent
@@ -44,10 +43,11 @@ sure (`--trust`, or Trust in the Shape panel; at 0 the silhouette alone gives th
 where DINOv2's weights are not there).
 
 - **What it is**: a U-Net of {parameters:.1f} million parameters,
-  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in half precision, of 8 binary
+  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in half precision, of 6 binary
   digits), SHA-256 `{sha256}`.
 - **Licence**: Apache-2.0 as the program. It was trained from nothing on pictures that the program
-  draws itself; nobody's weights are in it. At work it reads DINOv2 ViT-S/14's tokens (Apache-2.0).
+  draws itself; nobody's weights are in it. At work it reads DINOv2 ViT-S/14's tokens (Apache-2.0),
+  and looks at each object twice, once mirrored: the mean of both is used.
 - **Training**: `objectmorpher train shape --folder F --samples {samples} --passes {passes:g}`:
   {steps} steps of {batch} samples; half an hour for the samples and an hour and a quarter for the
   training on two cores, without a GPU (three and a half hours on cores without bfloat16; a GPU is
@@ -171,15 +171,12 @@ def _curve(curve: list[dict[str, float]], steps: int) -> str:
 
 def _draw_samples(path: Path) -> None:
     """Photo; front, true and found; normals, true and found; edges found. Two samples in a row."""
-    net, tokens = ShapeModel(registry.shape_network()), dino_tokens.shared()
+    net = ShapeModel(registry.shape_network())
     rows = []
     for seed in UNSEEN:
         sample = make_sample(seed)
-        planes = planes_of(sample.rgb, sample.mask, sample.tangents)
         crop = Crop(0, 0, len(sample.mask), sample.tangents)
-        rows.append(
-            _row(sample, net.look(planes, tokens.inner_tokens(sample.rgb), sample.mask, crop))
-        )
+        rows.append(_row(sample, net.look(sample.rgb, sample.mask, crop)))
     half = len(rows) // 2
     sheet = np.concatenate([np.concatenate(part, 0) for part in (rows[:half], rows[half:])], 1)
     cv2.imwrite(str(path), sheet[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])

@@ -24,9 +24,13 @@ MARK = "compiled.txt"  # in the kernels' folder: the build that all were compile
 
 
 def warm_up() -> None:
-    """A minute or two the first time after an installation, seconds afterwards."""
+    """A minute or two the first time after an installation, seconds afterwards.
+
+    The largest kernels of a checkout are compiled by processes beside this one.
+    """
     from objectmorpher_core import warm_up as core
 
+    core.compile_beside()
     from ..canvas.shape import build_shape, rehearse
     from ..render import flattening
     from ..render.splat_pass import near_to_far

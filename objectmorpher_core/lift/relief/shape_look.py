@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ... import models
-from ...base.arrays import F32, Mask, Pixels
+from ...base.arrays import F32, RGB, Mask, Pixels
 from ...base.camera import Camera
 from ...models import registry
 from ...models.onnx_session import open_session
@@ -22,6 +22,7 @@ from ...segment import dino_tokens
 from ..crop import Crop, planes_of
 
 NO_EDGE = -12.0  # logit
+NORMAL, SIDEWAYS = slice(3, 6), 3  # of what the network says: the normals, and their x
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +50,9 @@ class SeenShape:
     @staticmethod
     def of(raw: F32, mask: Mask, crop: Crop) -> SeenShape:
         """Read the network's output, (9, s, s); see `training.shape_net`."""
-        normal = raw[3:6] / np.maximum(np.linalg.norm(raw[3:6], axis=0), 1e-6)
         return SeenShape(
             crop, mask, raw[0] - raw[0][mask].mean(), raw[1], np.maximum(raw[1], raw[2]),
-            normal.transpose(1, 2, 0), 1 / (1 + np.exp(-np.maximum(raw[6], NO_EDGE))),
+            _unit(raw[NORMAL]).transpose(1, 2, 0), 1 / (1 + np.exp(-np.maximum(raw[6], NO_EDGE))),
             np.exp(raw[7]), np.exp(raw[8]),
         )  # fmt: skip
 
@@ -65,6 +65,11 @@ def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
     if missing() is not None or not mask.any():
         return None
     return _memory.look(pixels, mask, Crop.around(mask, camera))
+
+
+def _unit(vectors: F32) -> F32:
+    """Vectors (3, ...) of length 1."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=0), 1e-6)
 
 
 def missing() -> str | None:
@@ -80,11 +85,26 @@ class ShapeModel:
     def __init__(self, data: bytes) -> None:
         self._session: Any = open_session(data)
 
-    def look(self, planes: F32, tokens: F32, mask: Mask, crop: Crop) -> SeenShape:
-        """Look at planes (7, s, s) and tokens (g, g, c) of a crop."""
-        wanted = {"planes": planes[None], "tokens": tokens.transpose(2, 0, 1)[None]}
-        found = self._session.run(None, {k: np.ascontiguousarray(v) for k, v in wanted.items()})
-        return SeenShape.of(np.asarray(found[0][0], np.float32), mask, crop)
+    def look(self, rgb: RGB, mask: Mask, crop: Crop) -> SeenShape:
+        """Look at a crop (s, s, 3) and at its mirror image; what is seen is the mean of both.
+
+        What the network gets wrong in one it seldom gets equally wrong in the other.
+        """
+        mirrored = crop.tangents * np.array([-1, 1, 1], np.float32)
+        direct = self._raw(rgb, mask, crop.tangents)
+        other = self._raw(rgb[:, ::-1], mask[:, ::-1], mirrored)[:, :, ::-1]
+        other[SIDEWAYS] *= -1
+        return SeenShape.of(0.5 * (direct + other), mask, crop)
+
+    def _raw(self, rgb: RGB, mask: Mask, tangents: F32) -> F32:
+        """(9, s, s) what the network says, its normals unit vectors."""
+        rgb, mask = np.ascontiguousarray(rgb), np.ascontiguousarray(mask)
+        tokens = dino_tokens.shared().inner_tokens(rgb)
+        wanted = {"planes": planes_of(rgb, mask, tangents), "tokens": tokens.transpose(2, 0, 1)}
+        whole = {name: np.ascontiguousarray(value[None]) for name, value in wanted.items()}
+        raw = np.array(self._session.run(None, whole)[0][0], np.float32)
+        raw[NORMAL] = _unit(raw[NORMAL])
+        return raw
 
 
 class _Memory:
@@ -109,8 +129,7 @@ class _Memory:
                 return self._last[1]
             if self._net is None:
                 self._net = ShapeModel(registry.shape_network())
-            tokens = dino_tokens.shared().inner_tokens(rgb)
-            found = self._net.look(planes_of(rgb, seen, crop.tangents), tokens, seen, crop)
+            found = self._net.look(rgb, seen, crop)
             self._last = digest, found
             return found
 

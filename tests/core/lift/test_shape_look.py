@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,13 +12,12 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift.crop import Crop, planes_of
+from objectmorpher_core.lift.crop import Crop
 from objectmorpher_core.lift.relief import shape_look
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeModel
 from objectmorpher_core.models import registry
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.segment import dino_tokens
 from objectmorpher_research.training.shape_eval import (
     camera_of,
     relief,
@@ -48,9 +48,7 @@ def sample(seed: int) -> Sample:
 
 
 def seen(net: ShapeModel, one: Sample) -> SeenShape:
-    crop = Crop(0, 0, len(one.mask), one.tangents)
-    tokens = dino_tokens.shared().inner_tokens(one.rgb)
-    return net.look(planes_of(one.rgb, one.mask, one.tangents), tokens, one.mask, crop)
+    return net.look(one.rgb, one.mask, Crop(0, 0, len(one.mask), one.tangents))
 
 
 @pytest.mark.skipif(not registry.is_shipped(), reason="no shape network ships yet")
@@ -96,6 +94,16 @@ def test_what_it_says_is_a_shape(net):
         assert np.allclose(np.linalg.norm(found.normal, axis=-1), 1, atol=1e-3)
         assert (found.edge >= 0).all() and (found.edge <= 1).all()
         assert (found.front_error > 0).all() and (found.depth_error > 0).all()
+
+
+def test_of_a_mirror_image_it_says_the_mirror_image(net):
+    one = sample(UNSEEN[0])
+    tangents = one.tangents * np.array([-1, 1, 1], np.float32)
+    found = seen(net, one)
+    other = seen(net, replace(one, rgb=one.rgb[:, ::-1], mask=one.mask[:, ::-1], tangents=tangents))
+    for name in ("front", "thickness", "depth", "edge", "front_error", "depth_error"):
+        assert np.allclose(getattr(other, name)[:, ::-1], getattr(found, name), atol=1e-4), name
+    assert np.allclose(other.normal[:, ::-1] * [-1, 1, 1], found.normal, atol=1e-4)
 
 
 @pytest.mark.slow
