@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 from functools import cache
 from pathlib import Path
 from subprocess import Popen
@@ -115,9 +116,30 @@ def _load(self: Any, key: Any) -> Any:
     return found
 
 
+def _load_index(self: Any) -> dict[Any, str]:
+    """The list of variants; empty where it is of an older version, and names what is gone.
+
+    numba reads a list before it looks at whose it is.
+    """
+    try:
+        return _load_index_now(self)
+    except UNREADABLE:
+        return {}
+
+
+def _load_data(self: Any, name: str) -> Any:
+    """A variant. Raises OSError, after which it is compiled anew, where it cannot be read."""
+    try:
+        return _load_data_now(self, name)
+    except UNREADABLE as error:
+        raise OSError(f"{name} cannot be read") from error
+
+
+UNREADABLE = (ImportError, AttributeError, EOFError, ValueError, TypeError, pickle.UnpicklingError)
 files: Any = caching.IndexDataCacheFile
-_load_now = files.load
+_load_now, _load_index_now, _load_data_now = files.load, files._load_index, files._load_data
 files.save, files.load = _save, _load
+files._load_index, files._load_data = _load_index, _load_data
 
 
 class _Kernels:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from numba.core import caching
@@ -41,6 +43,29 @@ def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:
     assert [Files(str(tmp_path), "blend", 1).load(key) for key in KEYS] == list(KEYS)
     assert len(list(tmp_path.glob("*.nbc"))) == len(KEYS)
     assert Files(str(tmp_path), "blend", 2).load(KEYS[0]) is None  # of other sources
+
+
+def test_a_kernel_that_names_what_is_gone_is_compiled_anew(tmp_path: Path, monkeypatch) -> None:
+    """As after an update that moved or removed a module, or a disk that was full."""
+    for gone in ("a module", "a name", "the end"):
+        module = ModuleType("gone")
+        module.Type = type("Type", (), {"__module__": "gone", "__qualname__": "Type"})  # type: ignore
+        monkeypatch.setitem(sys.modules, "gone", module)
+        files = Files(str(tmp_path), "blend", 1)
+        files.save(module.Type, module.Type)
+        files.save("kept", module.Type())
+        if gone == "the end":
+            for path in tmp_path.iterdir():
+                path.write_bytes(path.read_bytes()[:-3])
+        elif gone == "a name":
+            monkeypatch.delattr(module, "Type")
+        else:
+            monkeypatch.delitem(sys.modules, "gone")
+        found = Files(str(tmp_path), "blend", 1)
+        assert found.load("kept") is None, gone
+        found.save("kept", 5)
+        assert Files(str(tmp_path), "blend", 1).load("kept") == 5
+        monkeypatch.undo()
 
 
 def test_no_kernel_is_kept_otherwise() -> None:
