@@ -20,9 +20,10 @@ KERNELS := $(PYTHON) -m tests.kernels
 PHOTO ?=
 ARGS ?=
 LOCK ?= # versions and hashes of what the tests need: packaging/locks/ci.txt
-# Several test files run at a time, each in one process; JOBS=0 is for debuggers. Python keeps what it
-# compiles of the tests, which is a third of the time that a run takes to begin.
-JOBS ?= auto
+# Several test files run at a time, each in one process: one more than there are cores, for tests with a
+# window wait as long as they work; JOBS=0 is for debuggers. Python keeps what it compiles of the tests,
+# which is a third of the time that a run takes to begin.
+JOBS ?= $(shell echo $$(($$(nproc 2>/dev/null || echo 4) + 1)))
 PYTEST = PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest -n $(JOBS) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # Installs Debian packages where this is Debian or Ubuntu and we may; fails quietly elsewhere.
