@@ -100,11 +100,16 @@ picture ends. At turn 20, turn 35 and pitch 20 the wobble of the ten was 1.32, 1
 and 1.40, 1.41 and 1.63 of those held out. What is left of box and brick is at hidden corners, of
 the mug at 35 degrees it is the handle, which in truth comes before the body.
 
+The network looks at an object and at its mirror image, and the mean of both is used: what it gets
+wrong in one it seldom gets equally wrong in the other. Before, fronts were off by 0.182 and
+thicknesses by 0.350, and a turn by 20 degrees came out at 19.3 dB, at 19.5 of those held out.
+
 What gained nothing and went out again: to heed more of the waves that the network sees behind (the
 ball loses 1.8 dB), to even the depth along the rim, to let the middle go on as a plane beyond the
-outline, four times as many Gaussians (the plate's wobble falls from 1.55 to 1.42 only), and to even
-corners as the rest of an outline (the box loses 0.3 dB). Another seed alone moves the ring by 0.1
-to 0.3 dB. Newly shown sides are [invented pictures](../concepts/photo-texture.md), which are never
+outline, four times as many Gaussians (the plate's wobble falls from 1.55 to 1.42 only), to even
+corners as the rest of an outline (the box loses 0.3 dB), and two further looks at a crop that is
+wider by 15 % (thicknesses are off by 0.347 then). Another seed alone moves the ring by 0.1 to
+0.3 dB. Newly shown sides are [invented pictures](../concepts/photo-texture.md), which are never
 the true ones: on the ball they cost 0.3 dB against a plain colour.
 
 Where such a picture is plainer than the object, texture is quilted over it, and what a soft edge
