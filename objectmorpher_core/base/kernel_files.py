@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 from functools import cache
 from pathlib import Path
 from subprocess import Popen
@@ -134,7 +135,7 @@ def _load_data(self: Any, name: str) -> Any:
         raise OSError(f"{name} cannot be read") from error
 
 
-UNREADABLE = (ImportError, AttributeError, EOFError, ValueError, TypeError, caching.pickle.UnpicklingError)
+UNREADABLE = (ImportError, AttributeError, EOFError, ValueError, TypeError, pickle.UnpicklingError)
 files: Any = caching.IndexDataCacheFile
 _load_now, _load_index_now, _load_data_now = files.load, files._load_index, files._load_data
 files.save, files.load = _save, _load
