@@ -28,14 +28,14 @@ def export(net: ShapeNet, path: Path) -> str:
     be joined, as normalisations into convolutions, onnxruntime joins when it opens it.
     """
     inputs = (torch.zeros(1, PLANES, SIDE, SIDE), torch.zeros(1, WIDTH, GRID, GRID))
-    return write_onnx(net, inputs, path, INPUTS, (OUTPUT,))
+    return write_onnx(net, inputs, path, INPUTS, (OUTPUT,), DROPPED)
 
 
 def write_onnx(
     net: nn.Module, inputs: tuple[Tensor, ...], path: Path, names: Sequence[str],
-    outputs: Sequence[str],
+    outputs: Sequence[str], dropped: int,
 ) -> str:  # fmt: skip
-    """Write any network as `export` does; its SHA-256."""
+    """Write any network as `export` does, its weights without `dropped` digits; its SHA-256."""
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
@@ -51,7 +51,7 @@ def write_onnx(
         if weight.data_type != TensorProto.FLOAT or len(weight.dims) < 2:
             narrow.append(weight)
             continue
-        half = _rounded(numpy_helper.to_array(weight).astype(np.float16))
+        half = _rounded(numpy_helper.to_array(weight).astype(np.float16), dropped)
         narrow.append(numpy_helper.from_array(half, weight.name + HALF))
         casts.append(
             helper.make_node("Cast", [weight.name + HALF], [weight.name], to=TensorProto.FLOAT)
@@ -66,12 +66,12 @@ def write_onnx(
     return hashlib.sha256(data).hexdigest()
 
 
-def _rounded(weights: np.ndarray) -> np.ndarray:
-    """Weights of float16, to the nearest whose last DROPPED binary digits are 0; ties to even.
+def _rounded(weights: np.ndarray, dropped: int) -> np.ndarray:
+    """Weights of float16, to the nearest whose last `dropped` binary digits are 0; ties to even.
 
-    On six photographs that moves what the network sees by a hundredth of its spread.
+    On six photographs DROPPED moves what the network sees by a hundredth of its spread.
     """
-    bits, step = weights.view(np.uint16).astype(np.uint32), 1 << DROPPED
+    bits, step = weights.view(np.uint16).astype(np.uint32), 1 << dropped
     nearest = (bits + step // 2 - 1 + (bits // step & 1)) // step * step
     return nearest.astype(np.uint16).view(np.float16)
 
