@@ -14,7 +14,7 @@ PYTHON := .venv/bin/python
 PIP := $(PYTHON) -m pip --disable-pip-version-check
 # Bytecode, also where PYTHONDONTWRITEBYTECODE says that no import writes any: every window has a
 # worker process, which would compile all sources anew.
-COMPILE := $(PYTHON) -m compileall -q app objectmorpher_core research tests
+COMPILE := $(PYTHON) -m compileall -q -j 0 app objectmorpher_core research tests
 # The kernels, before processes that begin together compile the same ones.
 KERNELS := $(PYTHON) -m tests.kernels
 PHOTO ?=
