@@ -61,6 +61,7 @@ test-slow: .make/test
 .PHONY: test-models
 TORCH ?= torch==2.13.0
 BESIDE := 'torchmetrics>=1.6' # others' measures, to compare ours with
+LEARNED := [^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart
 test-models: .make/models
 	@$(COMPILE)
 	@$(KERNELS)
@@ -68,7 +69,6 @@ test-models: .make/models
 
 # What `make test` leaves out: the slow tests, and what PyTorch, Ray or a browser is needed for.
 .PHONY: test-rest
-LEARNED := [^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart
 test-rest: .make/test
 	@$(COMPILE)
 	@$(KERNELS)
