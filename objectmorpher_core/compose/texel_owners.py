@@ -105,12 +105,12 @@ class Strays:
         return Strays(owners, rest, owners.are_others(rest.lifted.texture.u0, rest.means))
 
     def meet(self, painted: Mask, left: int, top: int) -> Mask:
-        """(N,) which of the soft edge's show texels of another surface that are `painted` (h, w).
+        """(N,) which show texels of another surface that are `painted` (h, w).
 
         `left`, `top`: px of the photo, their corner.
         """
         found, (height, width) = np.zeros(len(self.rest), bool), painted.shape
-        index = np.flatnonzero(self.is_stray & ~self.rest.lifted.is_body)
+        index = np.flatnonzero(self.is_stray)
         for step in itertools.product(AROUND, AROUND):
             texels = self.rest.lifted.texture.u0[index] + self.rest.spacing_px * np.array(step)
             column, row = (np.floor(texels).astype(np.int64) - [left, top]).T

@@ -210,11 +210,16 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
 
 
 def is_in_place(item: EditObject, document: Document) -> bool:
-    """Whether it stands where it does in the photo, however it is turned there."""
+    """Whether it has its size and, however it is turned, its foot where they are in the photo.
+
+    Of what flies, its centre. A place computed from a matrix is off by rounding.
+    """
     placement, lifted = item.placement, item.lifted
+    if abs(placement.scale - 1) > STILL:
+        return False
     if placement.move == (0, 0) and placement.depth == 0:
         return True
-    if lifted is None or not lifted.stands:
+    if lifted is None:
         return False
     points = lifted.world_points(lifted.body.means)
     foot = _still(points, lifted, gimbal_of(item, document).down)

@@ -394,9 +394,7 @@ def has_left(item: EditObject, document: Document) -> bool:
     Turned, spun and bent it still stands there: its true shadow is then nearer to the one in the
     photo than to any that can be made.
     """
-    if not item.is_visible or item.placement.scale != 1:
-        return True
-    return not is_in_place(item, document)
+    return not (item.is_visible and is_in_place(item, document))
 
 
 def _hints(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:

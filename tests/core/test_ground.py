@@ -24,6 +24,7 @@ from objectmorpher_core.document.placement import (
     gimbal_of,
     ground_under,
     is_in_place,
+    placement_of,
     scaled,
     spun,
     turned,
@@ -194,6 +195,22 @@ def test_a_roll_keeps_the_middle_of_the_outline(scene):
     about_centre = middle(replace(start, turn=rolled)) - middle(start)
     assert np.linalg.norm(about_centre) > 0.5
     assert np.linalg.norm(middle(kept) - middle(start)) < 0.1 * np.linalg.norm(about_centre)
+
+
+@over("stands", [True, False])
+def test_a_place_is_in_place_whatever_the_rounding_of_how_it_was_computed(scene, stands):
+    document, camera = scene.document(), scene.camera
+    lifted = replace(scene.lifted, stands=stands)
+    thing = replace(document.objects[0], lifted=lifted)
+    down = gimbal_of(thing, document).down
+    for turn in ((20.0, 0.0, 0.0), (-31.0, 7.0, 3.0)):
+        place = turned(Placement(), turn, _points(scene), lifted, camera, down)
+        for off, is_still in ((0.0, True), (1e-9, True), (0.05, False)):
+            motion = place.matrix(lifted, camera)
+            motion[:3, :3] *= 1 + off
+            motion[:3, 3] += lifted.diameter * off
+            computed = replace(thing, placement=placement_of(motion, lifted, camera))
+            assert is_in_place(computed, document) == is_still, (turn, off)
 
 
 UPS = [(0.0, -1.0, 0.0), (0.1, -0.6, -float(np.sqrt(1 - 0.37)))]
