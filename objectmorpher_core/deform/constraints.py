@@ -20,7 +20,7 @@ from .binding import Binding
 from .response import Response
 from .skinning import coupling
 
-STEEP = 1e9  # condition from which an inverse loses what a solution keeps
+STEEP = 1e6  # condition from which an inverse loses what a solution keeps
 TIE = 1e-12  # x the softest constraint's own give: constraints that contradict each other average
 
 

@@ -50,10 +50,15 @@ def shard() -> None:
 
 
 def allow_four_bits(patch: Callable[[object, str, object], None] = setattr) -> None:
-    """On the CPU, which bitsandbytes can and diffusers refuses."""
+    """On the CPU, which bitsandbytes can and diffusers refuses.
+
+    For processors with bfloat16 it packs layers anew, and fails at those narrower than 64.
+    """
+    import bitsandbytes
     from diffusers.quantizers.bitsandbytes import BnB4BitDiffusersQuantizer
 
     patch(BnB4BitDiffusersQuantizer, "validate_environment", lambda *_, **__: None)
+    patch(bitsandbytes.nn.modules, "has_avx512bf16", lambda: False)
 
 
 def main(what: str, folder: str, weights: str, last: str) -> None:
