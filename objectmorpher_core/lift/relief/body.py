@@ -15,6 +15,7 @@ from ...document.model import LiftSettings
 from .canvas import bilinear
 from .cuts import Behind, Cuts, Overlaps, overlaps_of
 from .mirror import MirrorAxis
+from .plain_solid import PlainSolid
 from .silhouette import ReliefSilhouette
 from .standing import FLAT, Prism, StandingSheet, stand
 from .thickness import Thickness
@@ -38,6 +39,7 @@ class ReliefBody:
     own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
     behind: Behind | None = None  # what its shape hides from the photo; None: nothing is known
     kind: str = "free"  # what it was recognised as: see `shapes`
+    solid: PlainSolid | None = None  # what it is where it is nothing but that; None: nowhere
     lacks: F64 = field(default_factory=lambda: np.zeros(2))  # slope: see `lacking`
     doubt: float = 0.0  # x extent, expected error of the front's depth; 0: nobody said
     up: F64 | None = None  # (3,) camera axes, unit: what is up where it stands; None: not seen
@@ -70,7 +72,7 @@ class ReliefBody:
 
     def nearer(self, height: F64) -> ReliefBody:
         """Return the body with its parts moved towards the camera by `height` (h, w) px."""
-        return replace(self, middle=self.middle + height)
+        return replace(self, middle=self.middle + height, solid=None)
 
     def sample(self, xy: F64, side: float | F64) -> tuple[F64, F64]:
         """Height (N,) px and its gradient (N, 2) at photo px (N, 2).

@@ -79,7 +79,7 @@ def follow(
         share = share * _away(hidden, RIM[1] * extent / outline.cell)
     detail = np.where(is_inner, (gap - moved) * share, 0.0)
     detail = np.maximum(cv2.GaussianBlur(detail, (0, 0), 1.0), (THINNEST - 1) * half)
-    return replace(body, middle=body.middle + moved, detail=thickness * detail)
+    return replace(body, middle=body.middle + moved, detail=thickness * detail, solid=None)
 
 
 @dataclass(frozen=True, eq=False)

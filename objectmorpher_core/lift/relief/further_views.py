@@ -108,7 +108,7 @@ class _Rays:
         middle = body.middle + change.ravel()[nearest_in(self.inside)]
         whole = self.inside.astype(np.float64)
         return replace(
-            body, middle=middle,
+            body, middle=middle, solid=None,
             front=body.front.towards(np.maximum(share * before - extra, 0), whole),
             back=body.back.towards(share * halves[1], whole),
         )  # fmt: skip

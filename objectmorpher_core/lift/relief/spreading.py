@@ -20,6 +20,7 @@ from ...base.threads import in_threads
 from ...document.model import Matte
 from .body import BACK, FRONT, MIDDLE, ReliefBody
 from .canvas import bilinear
+from .plain_solid import PlainSolid
 from .silhouette import ReliefSilhouette
 
 # The outlines of a silhouette as lines, along which a surface has its rim.
@@ -140,18 +141,25 @@ def spread(
     spacing in 3D.
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
-    outline = body.silhouette
+    outline, solid = body.silhouette, body.solid
+    if solid is not None:
+        areas[1] = np.where(solid.own, 0.0, areas[1])
     lines, ends = rim_lines(outline.inside), []
     if matte is not None and body.behind is None:  # or the end of a hidden part is ragged
         lines = [_at_half(line, outline, matte) for line in lines]
     if body.behind is not None:
         ends = rim_lines(body.behind.stands)
     total = sum(area.sum() for area in areas) + _wall_area(body, lines) + _inner_area(body)
+    total += 0.0 if solid is None else solid.hidden_area
     spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
     density = OVERSAMPLING / spacing**2  # candidates per px^2
     chains = [_chain(body, lines + ends, FRONT, spacing), _chain(body, lines, BACK, spacing)]
+    if solid is not None:
+        chains[0] = np.vstack([chains[0], _seen_edges(solid, lines, outline, spacing)])
     drawn = [_draw(outline, area * density, rng) for area in areas]
     drawn = [xy[_is_within(xy, lines, outline, WITHDRAWN * spacing)] for xy in drawn]
+    if solid is not None:
+        chains[1] = chains[1][~_is_own(solid, outline, chains[1])]
     drawn = [np.vstack([chain, xy]) for chain, xy in zip(chains, drawn, strict=True)]
     around = [(_brim(body, band + BRIM * spacing, density, rng), 0)]
     around += _inner(body, spacing, density, rng)
@@ -165,6 +173,9 @@ def spread(
         sheets[0] = _own(sheets[0], body, COVERED * spacing)
     sheets += [surface.select(kept) for (surface, _), kept in zip(around, others, strict=True)]
     sheets.append(_wall(body, lines, spacing))
+    if solid is not None:
+        sheets.append(_hidden(body, solid, spacing, density, rng))
+        sheets.append(_own_wall(body, solid, spacing))
     return _joined(sheets), spacing
 
 
@@ -252,6 +263,53 @@ def _own(front: SurfacePoints, body: ReliefBody, covered: float) -> SurfacePoint
     return replace(front, is_seen=front.is_seen & ~is_beneath[i, j], color_xy=source[i, j])
 
 
+def _is_own(solid: PlainSolid, outline: ReliefSilhouette, xy: F64) -> Mask:
+    """Which photo px (N, 2) are of cells whose far side is the solid's."""
+    j, i = np.rint(outline.grid_xy(xy)).astype(int).T
+    height, width = outline.shape
+    return np.asarray(solid.own[np.clip(i, 0, height - 1), np.clip(j, 0, width - 1)])
+
+
+def _seen_edges(
+    solid: PlainSolid, lines: list[RimLine], outline: ReliefSilhouette, spacing: float
+) -> F64:
+    """Photo px (N, 2) in line along the edges of a solid that the photo shows."""
+    places, face = solid.along_edges(spacing)
+    xy, _ = solid.relief(places[solid.is_seen[face]])
+    return xy[_is_own(solid, outline, xy) & _is_within(xy, lines, outline, 0.0)]
+
+
+def _hidden(
+    body: ReliefBody,
+    solid: PlainSolid,
+    spacing: float,
+    density: float,
+    rng: np.random.Generator,
+) -> SurfacePoints:
+    """The sides of a solid that the photo does not show, evenly, and in line along its edges."""
+    lined, at_line = solid.along_edges(spacing)
+    places, of = solid.scattered(density, rng)
+    places, face = np.concatenate([lined, places]), np.r_[at_line, of]
+    xy, height = solid.relief(places)
+    kept = np.flatnonzero(_is_own(solid, body.silhouette, xy) & solid.is_hidden[face])
+    first = int(np.count_nonzero(kept < len(lined)))
+    order = np.r_[np.arange(first), first + rng.permutation(len(kept) - first)]
+    kept = kept[thin_to_spacing(places[kept], spacing * np.sqrt(PACKING), order)]
+    normals = solid.relief_normals(places[kept], solid.normals[face[kept]])
+    no = np.zeros(len(kept), bool)
+    return SurfacePoints(xy[kept], height[kept], normals, no, no, no, xy[kept])
+
+
+def _own_wall(body: ReliefBody, solid: PlainSolid, spacing: float) -> SurfacePoints:
+    """A row of points along a solid's outline: what one sees of the rim when it turns."""
+    places, normals = solid.along_outline(spacing)
+    xy, height = solid.relief(places)
+    kept = np.flatnonzero(_is_own(solid, body.silhouette, xy))
+    kept = kept[thin_to_spacing(places[kept], spacing * np.sqrt(PACKING), np.arange(len(kept)))]
+    normals, no = solid.relief_normals(places[kept], normals[kept]), np.zeros(len(kept), bool)
+    return SurfacePoints(xy[kept], height[kept], normals, no, no, no, xy[kept])
+
+
 def _wall_area(body: ReliefBody, lines: list[RimLine]) -> float:
     """px^2 between the sheets where they do not meet at the outlines."""
     total = 0.0
@@ -295,6 +353,8 @@ def _wall(body: ReliefBody, lines: list[RimLine], spacing: float) -> SurfacePoin
         xy = body.silhouette.photo_xy(at)
         front, back = (body.sample(xy, side)[0] for side in (FRONT, BACK))
         rows = np.maximum(np.floor((front - back) / step), 1)
+        if body.solid is not None:  # which has its own
+            rows[_is_own(body.solid, body.silhouette, xy)] = 0
         for row in range(int(rows.max(initial=0))):
             there = row < rows
             share = (row + 0.5) / rows[there]

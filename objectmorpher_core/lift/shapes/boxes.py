@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from ...base.arrays import F64
-from .evidence import NORMAL_ERROR, TAIL, Build, Evidence, Misfit, refined
+from .evidence import NORMAL_ERROR, STRIDE, TAIL, Build, Evidence, Misfit, refined
 from .solids import Mesh, box
 
 # A flat sheet that looks like the photo: a plane from the network's front and normals.
@@ -50,6 +52,12 @@ KEPT = 2  # of them, that are refined
 TRIED = 10  # of them, that are drawn
 APART = 0.3  # radians between two that are kept
 ENDS = (2, 98)  # percentiles of what is seen along an axis
+# A box is fitted once more to an outline's places, in px of the crop: how many, how far they are off,
+# how many are independent, and from how many times that error on they count less.
+PLACES, OFF, INDEPENDENT, USUAL = 400, 0.5, 100, 3.0
+FREE = np.array([0.1, 0.1, 0.1, 0.02, 0.02, 0.02, 0.1, 0.1, 0.1])  # as STEPS, then
+WORSE = 1.0  # misfit, by which such a box may be farther from what the network sees
+NEAREST, FAR_OFF = 1e-3, 1e3
 STEPS = np.array([0.15, 0.15, 0.15, 0.03, 0.03, 0.03, 0.15, 0.15, 0.15])
 
 
@@ -66,7 +74,39 @@ def fit_box(evidence: Evidence) -> tuple[Mesh, Misfit]:
     guesses.sort(key=lambda guess: evidence.misfit(guess(np.zeros(9))).total)
     fits = [refined(guess, np.zeros(9), STEPS, evidence) for guess in guesses[:KEPT]]
     best = int(np.argmin([misfit.total for _, misfit in fits]))
-    return guesses[best](fits[best][0]), fits[best][1]
+    mesh, misfit = guesses[best](fits[best][0]), fits[best][1]
+    finer = guesses[best](_outlined(guesses[best], fits[best][0], evidence))
+    is_better = (found := evidence.misfit(finer)).total < misfit.total + WORSE
+    return (finer, found) if is_better else (mesh, misfit)
+
+
+def _outlined(build: Build, start: F64, evidence: Evidence) -> F64:
+    """Numbers (9,) near `start`, of the box whose own outline is nearest to the photo's.
+
+    Six corners of an outline say nearly all of a box; the evidence is looked at on a coarse grid.
+    """
+    ring = evidence.outline[:: max(1, len(evidence.outline) // PLACES)]
+    error = OFF * evidence.grid.step / STRIDE
+
+    def residuals(change: F64) -> F64:
+        vertices = build(start + FREE * change).vertices
+        if vertices[:, 2].min() <= NEAREST:
+            return np.full(len(ring) + len(change), FAR_OFF)
+        hull = vertices[:, :2] / vertices[:, 2:]
+        hull = hull[ConvexHull(hull).vertices]
+        away = _away(ring, hull) / error
+        return np.concatenate([away / np.sqrt(len(ring) / INDEPENDENT), change])
+
+    found = least_squares(residuals, np.zeros(len(start)), loss="soft_l1", f_scale=USUAL)
+    return start + FREE * found.x
+
+
+def _away(places: F64, hull: F64) -> F64:
+    """(n,) how far places (n, 2) are from a closed line (m, 2)."""
+    ways = np.roll(hull, -1, axis=0) - hull
+    off = places[:, None] - hull
+    share = ((off * ways).sum(2) / (ways**2).sum(1)).clip(0, 1)
+    return np.asarray(np.linalg.norm(off - share[..., None] * ways, axis=2).min(1), np.float64)
 
 
 def _turns(evidence: Evidence) -> tuple[Rotation, F64]:

@@ -13,6 +13,7 @@ from ...base.poisson_disk import nearest_in
 from ..relief.body import ReliefBody
 from ..relief.canvas import carried_on
 from ..relief.cuts import Cuts
+from ..relief.plain_solid import PlainSolid
 from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
@@ -23,6 +24,7 @@ from .solids import Drawn, Mesh, RayGrid, drawn
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
 BEYOND = 2.0  # cells from a shape's own outline, up to which its sides go on
+MISSED = 4.0  # cells from a shape's outline, up to which a silhouette ends as it does
 REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside it
 # Of a shape's description: outline, depth and normals, each 1 where it is as far off as expected;
 # what of the mask it leaves out; and that a surface of revolution may have any profile. The outline
@@ -81,17 +83,18 @@ class Recognised:
         if self.plane is not None:
             rays = np.concatenate([grid.tangents, np.ones((*grid.shape, 1))], -1)
             near = np.maximum(rays @ self.plane, 0.3 * float(np.median(rays @ self.plane)))
-            return PlacedShape(1 / near, 1 / near, np.ones(outline.shape), weight)
+            whole = np.ones(outline.shape)
+            return PlacedShape(1 / near, 1 / near, whole, weight, whole > 0)
         assert self.mesh is not None
         seen = drawn(self.mesh, grid)
         met = (seen.near > 0) & outline.inside
         if not met.any():
             ones = np.ones(outline.shape)
-            return PlacedShape(ones, ones, 0 * ones, 0.0)
+            return PlacedShape(ones, ones, 0 * ones, 0.0, met)
         near, far = (1 / field for field in _carried_on(seen, met))
         gap = cv2.distanceTransform((~met).astype(np.uint8), cv2.DIST_L2, 3) * outline.cell
         share = np.clip(2 - gap / (REACH * outline.extent), 0, 1)
-        return PlacedShape(near, far, share, weight)
+        return PlacedShape(near, far, share, weight, gap < MISSED * outline.cell)
 
 
 def _carried_on(seen: Drawn, met: Mask) -> tuple[F64, F64]:
@@ -117,6 +120,7 @@ class PlacedShape:
     far: F64
     share: F64  # in [0, 1], of a place that is the shape's
     weight: float
+    is_met: Mask  # (h, w) by rays, or nearly
 
 
 def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:
@@ -196,10 +200,14 @@ def _shows_sides(found: Recognised) -> bool:
 # A body that becomes the shape it was recognised as, where that explains it.
 
 STRAY = 0.2  # x extent, from which a front is something else than the shape's
+# Of a thing whose outline is surely a box's: the network's front is often far off at its corners.
+SURELY, FARTHER = 0.2, 3.0  # misfit of the outline, up to which that is so; x STRAY
 ROUNDS = 4  # of a plane that is fitted to most of a front
 SOFT = 0.02  # x extent, over which one gives way to the other
+ALONE = 0.95  # share, from which a body is nothing but the shape there
 ALONG = 0.05  # x extent, over which a tube's middle is smoothed
-INNER = 0.02  # x extent from the outline, nearer to which fronts are not compared
+INNER = 0.02  # x extent from the outline, nearer to which fronts are hardly compared
+AT_RIM = 0.05  # of a weight, that is left there
 
 
 def completed(
@@ -224,13 +232,32 @@ def completed(
     # The shape shows how it leans better than a network does, also of what sticks out of it.
     lean = _plane(near - front, compared, outline)
     body = replace(body, middle=body.middle + trust * places.weight * lean)
-    share = trust * _share(places, front + lean - near, body)
+    is_sure = shape.kind == "box" and shape.misfit.outline < SURELY
+    stray = STRAY * (FARTHER if is_sure else 1)
+    share = trust * _share(places, front + lean - near, body, stray)
     half = 0.5 * (near - far)
     sides = [side.towards(thickness * half, share) for side in (body.front, body.back)]
     middle = body.middle + share * (near - half - body.middle)
     body = replace(body, middle=middle, front=sides[0], back=sides[1], kind=shape.kind)
     body = replace(body, up=body.up if shape.up is None else shape.up)
-    return _whole(body, share)
+    return replace(
+        _whole(body, share), solid=_solid_of(shape, share, places, away, camera, thickness)
+    )
+
+
+def _solid_of(
+    shape: Recognised,
+    share: F64,
+    places: PlacedShape,
+    away: float,
+    camera: Camera,
+    thickness: float,
+) -> PlainSolid | None:
+    """The box itself where a body is nothing but it; `away`: the logarithm of its size in px."""
+    own = (share > ALONE) & places.is_met
+    if shape.mesh is None or shape.kind != "box" or thickness != 1 or not own.any():
+        return None
+    return PlainSolid(np.exp(away) * shape.mesh.vertices, shape.mesh.faces, camera, own)
 
 
 def flattened(body: ReliefBody, thickness: float) -> ReliefBody:
@@ -285,14 +312,15 @@ def _whole(body: ReliefBody, share: F64) -> ReliefBody:
     return replace(body, front=sides[0], back=sides[1], cuts=cuts, own=own)
 
 
-def _share(places: PlacedShape, off: F64, body: ReliefBody) -> F64:
+def _share(places: PlacedShape, off: F64, body: ReliefBody, stray: float) -> F64:
     """(h, w) how much of each cell is the shape's, whose front is `off` (h, w) px wrong."""
     outline = body.silhouette
     sigma = SOFT * outline.extent / outline.cell
-    weight = outline.inside.astype(np.float64)
+    # A network's fronts are round at their rims, also those of boxes.
+    weight = outline.inside * np.clip(outline.depth / (INNER * outline.extent), AT_RIM, 1) ** 2
     smooth = cv2.GaussianBlur(off * weight, (0, 0), sigma)
     smooth = smooth / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)
-    explained = 1 / (1 + (smooth / (STRAY * outline.extent)) ** 4)
+    explained = 1 / (1 + (smooth / (stray * outline.extent)) ** 4)
     return places.weight * places.share * explained
 
 

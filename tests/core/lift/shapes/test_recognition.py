@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull, KDTree
 
 from objectmorpher_core.base.arrays import Mask
 from objectmorpher_core.base.camera import Camera
@@ -15,8 +17,11 @@ from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
 from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.lifter import _world_normals
+from objectmorpher_core.lift.relief.plain_solid import PlainSolid
 from objectmorpher_core.lift.relief.shape_look import SeenShape
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
+from objectmorpher_core.lift.relief.spreading import spread
 from objectmorpher_core.lift.shapes import completed, flattened, recognised, rounded
 from objectmorpher_core.lift.shapes.solids import (
     Mesh,
@@ -206,3 +211,75 @@ def test_what_sticks_out_stays_as_it_was() -> None:
     xy = np.array([[min(right + 36, SIDE - 8) - 0.5, middle + 0.5]])
     before, after = (each.height(xy, 1.0) - each.height(xy, -1.0) for each in (body, whole))
     assert abs(after - before)[0] < 0.05 * body.silhouette.extent
+
+
+TURNS = [(35.0, -20.0, 5.0), (-25.0, 10.0, 0.0), (50.0, -8.0, -12.0)]
+
+
+def _misled(seen: SeenShape) -> SeenShape:
+    """As a network errs: the front leans by a tenth of the size, and is round at the rim."""
+    across = np.broadcast_to(np.linspace(-0.1, 0.1, SIDE, dtype=np.float32), seen.mask.shape)
+    away = cv2.distanceTransform(seen.mask.astype(np.uint8), cv2.DIST_L2, 5)
+    round_off = 0.05 * np.exp(-away / 6).astype(np.float32)
+    return replace(seen, front=seen.front + across - round_off, front_error=seen.front_error + 0.05)
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_a_box_is_as_its_outline_says_where_the_network_errs(turn) -> None:
+    mesh = box(AT, turn_matrix(*turn).T, np.array([0.22, 0.3, 0.15]))
+    seen, _ = see(mesh)
+    found = recognised(_misled(seen))
+    assert found is not None and found.mesh is not None
+    assert found.kind == "box"
+    true, own = (m.vertices[:, :2] / m.vertices[:, 2:] * SIDE / WIDTH for m in (mesh, found.mesh))
+    corners = true[ConvexHull(true).vertices]
+    away, _ = KDTree(own).query(corners)
+    assert away.max() < 1.5, "px, of its corners in the picture"
+    aligned = np.abs(found.mesh.axes @ mesh.axes.T).max(1)
+    assert aligned.min() > np.cos(np.radians(6.0))
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_the_hidden_sides_of_a_box_lie_on_it_and_have_no_gaps(turn) -> None:
+    mesh = box(AT, turn_matrix(*turn).T, np.array([0.22, 0.3, 0.15]))
+    seen, _ = see(mesh)
+    body, camera = body_of(seen)
+    found = recognised(seen)
+    assert found is not None
+    body = completed(fused(body, seen, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
+    solid = body.solid
+    assert solid is not None
+    surface, spacing = spread(body, 3000, 2.0, np.random.default_rng(0))
+    depth = camera.focal - surface.height
+    places = camera.unproject(surface.xy, depth)
+    sides = np.unique(np.round(solid.normals, 6), axis=0)
+    assert len(sides) == 6
+    far = (solid.vertices @ sides.T).max(0)  # of each side, along its normal
+    beyond = places @ sides.T - far
+    hidden = ~surface.is_seen & ~surface.is_brim
+    off = np.abs(beyond[hidden].max(1))  # 0 on the box
+    assert np.percentile(off, 99) < 0.25 * spacing
+    tree = KDTree(places[hidden])
+    rng = np.random.default_rng(1)
+    for side, edge in zip(sides, far, strict=True):
+        on_it = solid.vertices[np.abs(solid.vertices @ side - edge) < 1e-6 * camera.focal]
+        if side @ on_it.mean(0) < 0.2 * np.linalg.norm(on_it.mean(0)):
+            continue  # the photo shows it, or nearly
+        anywhere = rng.dirichlet(np.ones(4), 500) @ on_it
+        assert tree.query(anywhere)[0].max() < 1.5 * spacing
+    whole = replace(body, solid=None)
+    assert abs(len(surface.xy) / len(spread(whole, 3000, 2.0, rng)[0].xy) - 1) < 0.15
+    assert body.nearer(np.zeros(body.silhouette.shape)).solid is None, "what is moved is no box"
+
+
+def test_normals_of_a_solid_are_turned_into_relief_coordinates_and_back() -> None:
+    mesh, camera = _box(), camera_of(TANGENTS, SIDE)
+    solid = PlainSolid(200 * mesh.vertices, mesh.faces, camera, np.ones((2, 2), bool))
+    places, face = solid.scattered(0.01, np.random.default_rng(0))
+    xy, height = solid.relief(places)
+    np.testing.assert_allclose(camera.unproject(xy, camera.focal - height), places, atol=1e-6)
+    normals = solid.normals[face]
+    ray = (xy - [camera.cx, camera.cy]) / camera.focal
+    own = solid.relief_normals(places, normals)
+    back = _world_normals(own, ray, camera.focal - height, 1.0, camera.focal)
+    np.testing.assert_allclose(back, normals, atol=1e-9)
