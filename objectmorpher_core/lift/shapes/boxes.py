@@ -52,8 +52,8 @@ KEPT = 2  # of them, that are refined
 TRIED = 10  # of them, that are drawn
 APART = 0.3  # radians between two that are kept
 ENDS = (2, 98)  # percentiles of what is seen along an axis
-# A box is fitted once more to an outline's places, in px of the crop: how many, how far they are off,
-# how many are independent, and from how many times that error on they count less.
+# A box is fitted once more to places of an outline, in px of the crop: how many, how far they are
+# off, how many of them are independent, and from how many times that error on they count less.
 PLACES, OFF, INDEPENDENT, USUAL = 400, 0.5, 100, 3.0
 FREE = np.array([0.1, 0.1, 0.1, 0.02, 0.02, 0.02, 0.1, 0.1, 0.1])  # as STEPS, then
 WORSE = 1.0  # misfit, by which such a box may be farther from what the network sees
