@@ -210,9 +210,9 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
 
 
 def is_in_place(item: EditObject, document: Document) -> bool:
-    """Whether it has its size and, however it is turned, its foot where they are in the photo.
+    """Whether it is as large as in the photo, and its foot is where it is there, however turned.
 
-    Of what flies, its centre. A place computed from a matrix is off by rounding.
+    What flies is where its centre is. A place that is computed from a matrix is off by rounding.
     """
     placement, lifted = item.placement, item.lifted
     if abs(placement.scale - 1) > STILL:

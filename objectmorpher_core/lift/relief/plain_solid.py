@@ -7,7 +7,6 @@ only where points lie in line along it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -19,9 +18,11 @@ from ...base.camera import Camera
 
 SHARP = 0.75  # cosine of two faces' normals, below which the edge between them is one
 OBLIQUE = 0.1  # cosine to the ray, up to which the photo shows nothing of a face
-INSET = 0.6  # x spacing: so far beyond its outermost points a surface is drawn
-IN_LINE = 0.85  # x spacing: how far points along an edge are apart
-BEVEL = 0.1  # x spacing, by which a point on an edge lies within, so that it does not stick out
+INSET = 0.6  # x mean spacing: so far beyond its outermost points a surface is drawn
+IN_LINE = 0.85  # x mean spacing: how far points along an edge, or an outline, are apart
+BEVEL = (
+    0.1  # x mean spacing, by which a point on an edge lies within, so that it does not stick out
+)
 
 
 class _Edge(NamedTuple):
@@ -44,10 +45,9 @@ class PlainSolid:
     @cached_property
     def normals(self) -> F64:
         """(F, 3) outward, unit."""
-        corners = self.vertices[self.faces]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        cross *= np.sign(((corners[:, 0] - self.vertices.mean(0)) * cross).sum(1, keepdims=True))
-        return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True), np.float64)
+        away = self.vertices[self.faces[:, 0]] - self.vertices.mean(0)
+        outward = np.sign((away * self._cross).sum(1, keepdims=True))
+        return np.asarray(outward * self._cross / (2 * self._areas[:, None]), np.float64)
 
     @cached_property
     def is_seen(self) -> Mask:
@@ -122,23 +122,26 @@ class PlainSolid:
         return np.asarray((self.normals * middles).sum(1) / np.linalg.norm(middles, axis=1))
 
     @cached_property
+    def _cross(self) -> F64:
+        """(F, 3) across each face, twice as long as its area."""
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
+        return np.asarray(np.cross(b - a, c - a), np.float64)
+
+    @cached_property
     def _areas(self) -> F64:
         """(F,) px^2"""
-        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
-        return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), np.float64)
+        return np.asarray(0.5 * np.linalg.norm(self._cross, axis=1), np.float64)
 
     @cached_property
     def _edges(self) -> list[_Edge]:
-        return list(self._sharp())
-
-    def _sharp(self) -> Iterator[_Edge]:
-        beside: dict[tuple[int, int], int] = {}
+        found, beside = [], dict[tuple[int, int], int]()
         for face, corners in enumerate(self.faces.tolist()):
             for k in range(3):
-                ends = (corners[k - 1], corners[k])
+                ends = [corners[k - 1], corners[k]]
                 other = beside.setdefault((min(ends), max(ends)), face)
                 if other != face and self.normals[face] @ self.normals[other] < SHARP:
-                    yield _Edge(self.vertices[list(ends)], (other, face))
+                    found.append(_Edge(self.vertices[ends], (other, face)))
+        return found
 
 
 def _along(edge: _Edge, spacing: float, margin: float) -> F64:

@@ -20,7 +20,7 @@ from ...base.threads import in_threads
 from ...document.model import Matte
 from .body import BACK, FRONT, MIDDLE, ReliefBody
 from .canvas import bilinear
-from .plain_solid import PlainSolid
+from .plain_solid import IN_LINE, INSET, PlainSolid
 from .silhouette import ReliefSilhouette
 
 # The outlines of a silhouette as lines, along which a surface has its rim.
@@ -103,8 +103,6 @@ def _at_half(line: RimLine, outline: ReliefSilhouette, matte: Matte) -> RimLine:
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
 WITHDRAWN = 0.3  # x mean spacing: so far inside an outline a sheet's points are, but for its chain
-INSET = 0.6  # x mean spacing: so far beyond its outermost points a surface is drawn
-IN_LINE = 0.85  # x mean spacing: how far points along an outline are apart
 COVERED = 0.6  # x mean spacing: so far beyond a part's end it is drawn over what is behind
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
 WITHIN = 0.45  # cells from a near cell to its wall: just before the far one begins
@@ -142,7 +140,7 @@ def spread(
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
     outline, solid = body.silhouette, body.solid
-    if solid is not None:
+    if solid is not None:  # which has a back of its own
         areas[1] = np.where(solid.own, 0.0, areas[1])
     lines, ends = rim_lines(outline.inside), []
     if matte is not None and body.behind is None:  # or the end of a hidden part is ragged
@@ -156,10 +154,9 @@ def spread(
     chains = [_chain(body, lines + ends, FRONT, spacing), _chain(body, lines, BACK, spacing)]
     if solid is not None:
         chains[0] = np.vstack([chains[0], _seen_edges(solid, lines, outline, spacing)])
+        chains[1] = chains[1][~_is_own(solid, outline, chains[1])]
     drawn = [_draw(outline, area * density, rng) for area in areas]
     drawn = [xy[_is_within(xy, lines, outline, WITHDRAWN * spacing)] for xy in drawn]
-    if solid is not None:
-        chains[1] = chains[1][~_is_own(solid, outline, chains[1])]
     drawn = [np.vstack([chain, xy]) for chain, xy in zip(chains, drawn, strict=True)]
     around = [(_brim(body, band + BRIM * spacing, density, rng), 0)]
     around += _inner(body, spacing, density, rng)
@@ -174,8 +171,10 @@ def spread(
     sheets += [surface.select(kept) for (surface, _), kept in zip(around, others, strict=True)]
     sheets.append(_wall(body, lines, spacing))
     if solid is not None:
-        sheets.append(_hidden(body, solid, spacing, density, rng))
-        sheets.append(_own_wall(body, solid, spacing))
+        sheets.append(_hidden(solid, outline, spacing, density, rng))
+        # What one sees of its rim when it turns.
+        rim, normals = solid.along_outline(spacing)
+        sheets.append(_on_solid(solid, outline, rim, normals, len(rim), spacing, rng))
     return _joined(sheets), spacing
 
 
@@ -280,32 +279,35 @@ def _seen_edges(
 
 
 def _hidden(
-    body: ReliefBody,
     solid: PlainSolid,
+    outline: ReliefSilhouette,
     spacing: float,
     density: float,
     rng: np.random.Generator,
 ) -> SurfacePoints:
     """The sides of a solid that the photo does not show, evenly, and in line along its edges."""
-    lined, at_line = solid.along_edges(spacing)
-    places, of = solid.scattered(density, rng)
-    places, face = np.concatenate([lined, places]), np.r_[at_line, of]
+    lined, faces = solid.along_edges(spacing)
+    lined, faces = lined[solid.is_hidden[faces]], faces[solid.is_hidden[faces]]
+    places, further = solid.scattered(density, rng)
+    places, normals = np.concatenate([lined, places]), solid.normals[np.r_[faces, further]]
+    return _on_solid(solid, outline, places, normals, len(lined), spacing, rng)
+
+
+def _on_solid(
+    solid: PlainSolid,
+    outline: ReliefSilhouette,
+    places: F64,
+    normals: F64,
+    first: int,
+    spacing: float,
+    rng: np.random.Generator,
+) -> SurfacePoints:
+    """Places and unit normals (n, 3) of a solid, where it is the body; the `first` go first."""
     xy, height = solid.relief(places)
-    kept = np.flatnonzero(_is_own(solid, body.silhouette, xy) & solid.is_hidden[face])
-    first = int(np.count_nonzero(kept < len(lined)))
-    order = np.r_[np.arange(first), first + rng.permutation(len(kept) - first)]
+    kept = np.flatnonzero(_is_own(solid, outline, xy))
+    leading = int(np.count_nonzero(kept < first))
+    order = np.r_[np.arange(leading), leading + rng.permutation(len(kept) - leading)]
     kept = kept[thin_to_spacing(places[kept], spacing * np.sqrt(PACKING), order)]
-    normals = solid.relief_normals(places[kept], solid.normals[face[kept]])
-    no = np.zeros(len(kept), bool)
-    return SurfacePoints(xy[kept], height[kept], normals, no, no, no, xy[kept])
-
-
-def _own_wall(body: ReliefBody, solid: PlainSolid, spacing: float) -> SurfacePoints:
-    """A row of points along a solid's outline: what one sees of the rim when it turns."""
-    places, normals = solid.along_outline(spacing)
-    xy, height = solid.relief(places)
-    kept = np.flatnonzero(_is_own(solid, body.silhouette, xy))
-    kept = kept[thin_to_spacing(places[kept], spacing * np.sqrt(PACKING), np.arange(len(kept)))]
     normals, no = solid.relief_normals(places[kept], normals[kept]), np.zeros(len(kept), bool)
     return SurfacePoints(xy[kept], height[kept], normals, no, no, no, xy[kept])
 

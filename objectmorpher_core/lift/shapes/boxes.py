@@ -57,7 +57,7 @@ ENDS = (2, 98)  # percentiles of what is seen along an axis
 PLACES, OFF, INDEPENDENT, USUAL = 400, 0.5, 100, 3.0
 FREE = np.array([0.1, 0.1, 0.1, 0.02, 0.02, 0.02, 0.1, 0.1, 0.1])  # as STEPS, then
 WORSE = 1.0  # misfit, by which such a box may be farther from what the network sees
-NEAREST, FAR_OFF = 1e-3, 1e3
+NEAREST, FAR_OFF = 1e-3, 1e3  # depth that a box has at least; what is off of one that has less
 STEPS = np.array([0.15, 0.15, 0.15, 0.03, 0.03, 0.03, 0.15, 0.15, 0.15])
 
 

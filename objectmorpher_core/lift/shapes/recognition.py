@@ -240,22 +240,16 @@ def completed(
     middle = body.middle + share * (near - half - body.middle)
     body = replace(body, middle=middle, front=sides[0], back=sides[1], kind=shape.kind)
     body = replace(body, up=body.up if shape.up is None else shape.up)
-    return replace(
-        _whole(body, share), solid=_solid_of(shape, share, places, away, camera, thickness)
-    )
+    own = (share > ALONE) & places.is_met & (thickness == 1)
+    return replace(_whole(body, share), solid=_solid_of(shape, own, away, camera))
 
 
-def _solid_of(
-    shape: Recognised,
-    share: F64,
-    places: PlacedShape,
-    away: float,
-    camera: Camera,
-    thickness: float,
-) -> PlainSolid | None:
-    """The box itself where a body is nothing but it; `away`: the logarithm of its size in px."""
-    own = (share > ALONE) & places.is_met
-    if shape.mesh is None or shape.kind != "box" or thickness != 1 or not own.any():
+def _solid_of(shape: Recognised, own: Mask, away: float, camera: Camera) -> PlainSolid | None:
+    """The box itself, where a body is nothing but it in its `own` cells (h, w), if in any.
+
+    `away`: the logarithm of its size in px.
+    """
+    if shape.mesh is None or shape.kind != "box" or not own.any():
         return None
     return PlainSolid(np.exp(away) * shape.mesh.vertices, shape.mesh.faces, camera, own)
 
