@@ -18,6 +18,7 @@ from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings
 from ...models import ModelError, ledger
 from ...models.plans import Need
+from ...models.weight_folder import count_parameters
 from ...splat_files.splats.ply import QUARTER_TURN, turned
 from .. import LiftError, LiftSubject
 from ..registration.imported import lift_imported
@@ -91,9 +92,23 @@ class TrellisLifter:
             raise LiftError(f"{error}: close other programs, or lift it as a relief") from error
 
     def need(self) -> Need:
-        """Return the memory that it needs."""
+        """Return the memory that it needs: as published, and less where its files are smaller."""
         numbers = ("float16",)  # as published
-        return Need(self.parameters, self.work, parts=True, numbers=numbers, is_slow_on_cpu=True)
+        share = self._size()
+        parameters, work = int(share * self.parameters), int(share * self.work)
+        return Need(parameters, work, parts=True, numbers=numbers, is_slow_on_cpu=True)
+
+    def _size(self) -> float:
+        """How large the model in the files is, as a share of the published one; 1 without files.
+
+        What stays in single precision counts twice in `parameters`, so all of it does here.
+        """
+        files = [f for id in self.ids for f in configs.weights_folder(id).rglob("*.safetensors")]
+        try:
+            counted = sum(count_parameters(at) for at in {file.parent for file in files})
+        except ModelError:
+            counted = 0  # who opens them says what is wrong
+        return min(1.0, 2 * counted / self.parameters) if counted else 1.0
 
     def _new_generator(self, folders: tuple[Path, ...], plan: Plan) -> Any:
         from .generator import Folders, Generator

@@ -39,6 +39,24 @@ def test_folders_of_the_users_are_found_by_the_lifter(tiny):
     assert configs.weights_folder(configs.TRELLIS) == tiny[0]
 
 
+def test_the_memory_asked_for_is_the_published_model_s_or_what_smaller_files_need(tiny):
+    published = lifter.TrellisLifter().need()
+    assert published.parameters == lifter.TrellisLifter.parameters
+    models.use_folder("trellis", tiny[0])
+    models.use_folder(configs.ENCODER, tiny[1])
+    need = lifter.TrellisLifter().need()
+    held = sum(weights_size(at) for folder in tiny for at in folder.rglob("*.safetensors"))
+    assert held <= need.weights("float32") <= 2 * held
+    assert need.work / published.work == pytest.approx(need.parameters / published.parameters, 0.01)
+
+
+def weights_size(at):
+    """Bytes of a file's weights in single precision."""
+    from safetensors.torch import load_file
+
+    return sum(4 * tensor.numel() for tensor in load_file(str(at)).values())
+
+
 def test_a_folder_that_was_linked_by_hand_is_found_as_before(tiny):
     models.folder().mkdir(parents=True)
     for id, at in zip((configs.TRELLIS, configs.ENCODER), tiny, strict=True):
