@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import KDTree
 
 from ...base.arrays import F64, Mask
-from ...base.poisson_disk import scattered, thin_to_spacing
+from ...base.poisson_disk import nearest_in, scattered, thin_to_spacing
 from ...base.threads import in_threads
 from ...document.model import Matte
 from .body import BACK, FRONT, MIDDLE, ReliefBody
@@ -103,7 +103,8 @@ def _at_half(line: RimLine, outline: ReliefSilhouette, matte: Matte) -> RimLine:
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
 WITHDRAWN = 0.3  # x mean spacing: so far inside an outline a sheet's points are, but for its chain
-COVERED = 0.6  # x mean spacing: so far beyond a part's end it is drawn over what is behind
+COVERED = 1.25  # x mean spacing: so far beyond a part's end it is drawn over what is behind
+MIXED = 0.45  # x mean spacing: so far within a part's end the photo shows some of what is behind
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
 WITHIN = 0.45  # cells from a near cell to its wall: just before the far one begins
 MIN_SPACING = 1.0  # px: more points than pixels carry nothing
@@ -158,7 +159,7 @@ def spread(
     drawn = [_draw(outline, area * density, rng) for area in areas]
     drawn = [xy[_is_within(xy, lines, outline, WITHDRAWN * spacing)] for xy in drawn]
     drawn = [np.vstack([chain, xy]) for chain, xy in zip(chains, drawn, strict=True)]
-    around = [(_brim(body, band + BRIM * spacing, density, rng), 0)]
+    around = [(_brim(body, band, spacing, density, rng), 0)]
     around += _inner(body, spacing, density, rng)
     # Most candidates of the sheets are dropped: their normals are found when that is done.
     clouds = [(xy, body.height(xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
@@ -167,7 +168,10 @@ def spread(
     front, back, *others = _thinned(clouds, first, spacing, rng)
     sheets = [_sheet(body, drawn[0][front], FRONT), _sheet(body, drawn[1][back], BACK)]
     if body.behind is not None:
-        sheets[0] = _own(sheets[0], body, COVERED * spacing)
+        sheets[0], around[0] = (
+            _own(sheets[0], body, spacing),
+            (_own(around[0][0], body, spacing), 0),
+        )
     sheets += [surface.select(kept) for (surface, _), kept in zip(around, others, strict=True)]
     sheets.append(_wall(body, lines, spacing))
     if solid is not None:
@@ -246,20 +250,35 @@ def _sheet(body: ReliefBody, xy: F64, side: float) -> SurfacePoints:
     return SurfacePoints(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
 
 
-def _own(front: SurfacePoints, body: ReliefBody, covered: float) -> SurfacePoints:
-    """`front` with the colours of its own parts, which show where the photo is drawn out too far.
+def _own(surface: SurfacePoints, body: ReliefBody, spacing: float) -> SurfacePoints:
+    """`surface`, the front or the brim, with the colours of its own parts.
 
-    Within `covered` px of what stands before it, that is what the photo shows.
+    They show where the photo is drawn out too far, and beside the ends of parts, where the photo
+    mixes two of them.
     """
     outline, behind = body.silhouette, body.behind
     assert behind is not None, "parts are known"
     j, i = np.clip(
-        np.rint(outline.grid_xy(front.xy)).astype(int), 0, np.array(outline.shape[::-1]) - 1
+        np.rint(outline.grid_xy(surface.xy)).astype(int), 0, np.array(outline.shape[::-1]) - 1
     ).T
-    away = cv2.distanceTransform((~behind.stands).astype(np.uint8), cv2.DIST_L2, 5) * outline.cell
-    is_beneath = ~behind.stands & (away < covered)
+    i, j = np.divmod(nearest_in(outline.inside)[i, j], outline.shape[1])
+    to_stands, to_rest = _away_from_parts(body)
+    is_mixed = np.where(behind.stands, to_rest < MIXED * spacing, to_stands < COVERED * spacing)
     source = outline.photo_xy(behind.seen_beside.astype(np.float64))
-    return replace(front, is_seen=front.is_seen & ~is_beneath[i, j], color_xy=source[i, j])
+    return replace(surface, is_seen=surface.is_seen & ~is_mixed[i, j], color_xy=source[i, j])
+
+
+def _away_from_parts(body: ReliefBody, pad: int = 0) -> tuple[F64, F64]:
+    """(h, w) px to what stands before other parts, and to those; `pad` cells more on all sides."""
+    outline, behind = body.silhouette, body.behind
+    assert behind is not None, "parts are known"
+
+    def away(part: Mask) -> F64:
+        beyond = np.pad(~part, pad, constant_values=True).astype(np.uint8)
+        found = cv2.distanceTransform(beyond, cv2.DIST_L2, 5) * outline.cell
+        return np.asarray(found, np.float64)
+
+    return away(behind.stands), away(outline.inside & ~behind.stands)
 
 
 def _is_own(solid: PlainSolid, outline: ReliefSilhouette, xy: F64) -> Mask:
@@ -451,14 +470,16 @@ def _end(line: RimLine, fields: F64, outline: ReliefSilhouette, spacing: float) 
 
 
 def _brim(
-    body: ReliefBody, reach: float, density: float, rng: np.random.Generator
+    body: ReliefBody, band: float, spacing: float, density: float, rng: np.random.Generator
 ) -> SurfacePoints:
-    """Around the silhouette, as far as `reach` px, at the height of its middle."""
-    outline = body.silhouette
+    """Around the silhouette, a little past the matte's `band` px, at the height of its middle."""
+    outline, reach = body.silhouette, band + BRIM * spacing
     pad = int(np.ceil(reach / outline.cell)) + 1
     inside = np.pad(outline.inside, pad).astype(np.uint8)
     distance = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5) * outline.cell
     ring = (inside == 0) & (distance < reach)
+    if body.behind is not None:  # between two parts its height would be that of neither
+        ring &= np.abs(np.subtract(*_away_from_parts(body, pad))) > spacing
     xy = _draw(outline, np.where(ring, density * outline.cell**2, 0.0), rng) - pad * outline.cell
     height, _ = body.sample(xy, MIDDLE)
     normals = np.column_stack([outline.outward(xy), np.zeros(len(xy))])

@@ -203,7 +203,7 @@ class Stack(NamedTuple):
             np.where(
                 is_wall[..., None],
                 wall_seen.nearest(wall_seen, wall, is_wall, "height"),
-                seen.nearest(seen, plain, self.lies & ~self.stands, "radius"),
+                _nearest(outline.inside & ~self.stands, clear),
             ),
         )  # fmt: skip
 
@@ -249,6 +249,13 @@ def _edged(stands: Mask, outline: ReliefSilhouette, reach: float, pixels: Pixels
     labels[(cv2.dilate(own, band) == 0) & outline.inside] = 2
     found = np.asarray(cv2.watershed(photo, labels))
     return outline.inside & np.where(found > 0, found == 1, stands)
+
+
+def _nearest(own: Mask, clear: np.ndarray) -> I64:
+    """(h, w, 2) columns and rows of the nearest cells well within a part's `own` (h, w)."""
+    inner = cv2.erode(own.astype(np.uint8), clear) > 0
+    rows, columns = np.divmod(nearest_in(inner if inner.any() else own), own.shape[1])
+    return np.stack([columns, rows], -1)
 
 
 def _photo(outline: ReliefSilhouette, pixels: Pixels) -> U8:
