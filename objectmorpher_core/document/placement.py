@@ -7,6 +7,7 @@ turn and scale stay, every point of the object keeps its offset from the centre.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -221,11 +222,22 @@ def is_in_place(item: EditObject, document: Document) -> bool:
         return True
     if lifted is None:
         return False
-    points = lifted.world_points(lifted.body.means)
-    foot = _still(points, lifted, gimbal_of(item, document).down)
+    foot = _foot(lifted, gimbal_of(item, document).down)
     motion = placement.matrix(lifted, document.photo.camera)
     off = np.linalg.norm(motion[:3, :3] @ foot + motion[:3, 3] - foot)
     return bool(off < STILL * lifted.diameter * lifted.scale)
+
+
+_FEET: WeakKeyDictionary[LiftedObject, tuple[np.ndarray, F64]] = WeakKeyDictionary()
+
+
+def _foot(lifted: LiftedObject, down: np.ndarray) -> F64:
+    """`_still` of an object that is not bent; it is asked for in each frame."""
+    known = _FEET.get(lifted)
+    if known is None or not np.array_equal(known[0], down):
+        known = down, _still(lifted.world_points(lifted.body.means), lifted, down)
+        _FEET[lifted] = known
+    return known[1]
 
 
 def _still(points: np.ndarray, lifted: LiftedObject, down: np.ndarray) -> F64:

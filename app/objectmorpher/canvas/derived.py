@@ -105,7 +105,7 @@ class Derived:
     def plate(self, document: Document) -> Plate | None:
         """Return the background of the view: the photo around the objects that are still there."""
         from objectmorpher_core.compose.order import holes
-        from objectmorpher_core.compose.plate.plate import plate_of_holes
+        from objectmorpher_core.compose.plate.plate import plate_of_holes, shaded
         from objectmorpher_core.compose.plate.residue import shown_shares
 
         gone, ghosts = holes(document), self.ghosts(document)
@@ -115,6 +115,7 @@ class Derived:
         return self._plates(
             lambda: plate_of_holes(document, gone, ghosts), document.plate,
             *gone, *(o.mask for o in document.objects), self._ghost_shares,
+            *shaded(document, gone),
         )  # fmt: skip
 
     def ghosts(self, document: Document) -> tuple[Ghost, ...]:

@@ -20,7 +20,16 @@ from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint
 from .. import Inpainter, InpaintError, LooksFar, TakesHints
 from ..blend import Box, distance
-from .residue import Ghost, find_ghosts, find_residue, shown_shares, visible_residue, with_ghosts
+from .residue import (
+    BLACK,
+    Ghost,
+    find_ghosts,
+    find_residue,
+    keeps_shade,
+    shown_shares,
+    visible_residue,
+    with_ghosts,
+)
 
 HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the object
 MIN_HOLE_MARGIN = 4.0  # px
@@ -28,6 +37,7 @@ SEAM = 0.45  # x hole margin, width of the seam around the object
 REACH = 3.0  # x hole margin: the fill's colour is corrected about so far into the hole
 COARSE = 4.0  # px of hole margin at which the correction is computed
 SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
+FAINT = 0.1  # of the logarithm of a fill: what is beside it by so little darker is no shadow
 CONTEXT = 1.0  # x the hole's longer side, kept around it for the inpainter to copy from
 LEAST_CONTEXT = 64  # px
 STRIP = 256  # rows that are joined at a time: of 100 megapixels all at once take 10 GB
@@ -136,26 +146,32 @@ def correction(difference: F32, ring: Mask, margin: float) -> F32:
 
 
 def _coarse_correction(difference: F32, ring: Mask, margin: float) -> F32:
-    """`correction` of what is 0 beside the ring (h, w, 3), as coarse as the margin allows.
+    """`correction` of what is 0 beside the ring (h, w, 3), as coarse as the margin allows."""
+    mean, share = _spread(difference, ring, margin)
+    mean *= share[..., None]
+    return mean
 
-    Shepard's interpolation with a heavy-tailed kernel.
+
+def _spread(values: F32, ring: Mask, margin: float) -> tuple[F32, F32]:
+    """The mean around each place of what is 0 beside the ring (h, w, 3), coarsely, and how near.
+
+    Shepard's interpolation with a heavy-tailed kernel. How near is 1 at the ring and falls to 0.
     """
     height, width = ring.shape
     if not ring.any():
-        return np.zeros((1, 1, 3), np.float32)
+        return np.zeros((1, 1, 3), np.float32), np.zeros((1, 1), np.float32)
     scale = min(COARSE / margin, 1.0)
     size = (max(round(width * scale), 1), max(round(height * scale), 1))
     known = cv2.resize(ring.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    values = cv2.resize(difference, size, interpolation=cv2.INTER_AREA)
-    total, mean = np.zeros_like(known), np.zeros_like(values)
+    fewer = cv2.resize(values, size, interpolation=cv2.INTER_AREA)
+    total, mean = np.zeros_like(known), np.zeros_like(fewer)
     for n, sigma in enumerate(SIGMAS):
         share = 100.0**-n
         total += share * cv2.GaussianBlur(known, (0, 0), sigma)
-        mean += share * cv2.GaussianBlur(values, (0, 0), sigma)
+        mean += share * cv2.GaussianBlur(fewer, (0, 0), sigma)
     mean /= np.maximum(total, 1e-12)[..., None]
     away = cv2.distanceTransform((known <= 0).astype(np.uint8), cv2.DIST_L2, 5)
-    mean *= np.exp(-away / (REACH * margin * scale))[..., None]
-    return np.asarray(mean, np.float32)
+    return np.asarray(mean, np.float32), np.exp(-away / (REACH * margin * scale))
 
 
 def _enlarged(small: F32, shape: tuple[int, ...]) -> F32:
@@ -171,11 +187,15 @@ def plate_of_holes(
     Around objects that are still there it is the photo, except where it was repaired by hand.
     `ghosts` saves finding them again.
     """
-    plate, near = document.plate, SEAM * hole_margin(*document.photo.size)
+    plate, margin = document.plate, hole_margin(*document.photo.size)
+    near = SEAM * margin
     ghosts = find_ghosts(document, near) if ghosts is None else ghosts
     if plate is not None and ghosts:
         shares = shown_shares(document, ghosts, holes)
         plate = with_ghosts(plate, document.photo.pixels, ghosts, shares)
+    still = shaded(document, holes)
+    if plate is not None and still:
+        plate = _in_shade(plate, document.photo.pixels, still, margin)
     there = [o for o in document.objects if o.mask is not None and not o.is_visitor]
     rest = [o for o in there if o.matte not in holes]
     if plate is None or not rest:
@@ -194,6 +214,50 @@ def plate_of_holes(
     x0, y0, x1, y1 = plate.box
     pixels = np.where(hole[..., None], plate.pixels, document.photo.pixels[y0:y1, x0:x1])
     return replace(plate, pixels=pixels, hole=hole, painted=painted)
+
+
+def shaded(document: Document, holes: tuple[Matte, ...]) -> tuple[Matte, ...]:
+    """Those of the `holes` in which the shadow beside them goes on."""
+    return tuple(
+        item.matte
+        for item in document.objects
+        if item.matte is not None and item.matte in holes and keeps_shade(item, document)
+    )
+
+
+def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: float) -> Plate:
+    """`plate` as dark behind what `still` stands there as the photo is beside that.
+
+    What a turn uncovers lies in the shadow that is left, which the fill has ended.
+    """
+    x0, y0, x1, y1 = plate.box
+    covered = np.zeros(plate.hole.shape, bool)
+    for matte in still:
+        covered |= crop(matte.alpha, matte.box, plate.box) > 0
+    own = plate.hole & (distance(covered) < SEAM * margin)
+    if plate.painted is not None:
+        own &= ~plate.painted
+    ring = ~plate.hole & (distance(own) < margin)
+    beside, near = _spread(_logarithm(photo[y0:y1, x0:x1], ring), ring, margin)
+    usual, _ = _spread(_logarithm(plate.pixels, own), own, margin)
+    darker = np.minimum(beside - usual + FAINT, 0) * np.minimum(2 * near, 1)[..., None]
+    change, least = _enlarged(darker, own.shape), _enlarged(beside - FAINT, own.shape)
+    pixels = plate.pixels.copy()
+    for first in range(0, len(pixels), STRIP):
+        strip = slice(first, first + STRIP)
+        there = own[strip]
+        fill = _logarithm(pixels[strip], there)[there]
+        shaded = np.clip(fill + change[strip][there], np.minimum(fill, least[strip][there]), fill)
+        pixels[strip][there] = pixels_from_unit(np.exp(shaded) - BLACK, pixels.dtype)
+    return replace(plate, pixels=pixels)
+
+
+def _logarithm(pixels: Pixels, where: Mask) -> F32:
+    """(h, w, 3) of pixels `where` (h, w), 0 elsewhere."""
+    values = unit_pixels(pixels) + np.float32(BLACK)
+    np.log(values, out=values)
+    values *= where[..., None]
+    return values
 
 
 def plate_picture(document: Document) -> Pixels:

@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
 from ...document.model import Document, EditObject, Matte, Plate
+from ...document.placement import is_in_place
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
@@ -172,6 +173,8 @@ def visible_residue(residue: Mask, photo: Pixels, fill: Pixels) -> Mask:
 MOVED = (1.0, 6.0)  # px of the photo: from here on it begins to be shown, and from here it is
 STEPS = 4  # in which it appears
 NEAREST = 4  # control points that say how what stands beside it has moved
+SHADE, TINTED = 0.25, 0.4  # tint, up to which a ghost is a shadow, and up to which it may be one
+BLACK = 0.02  # of sRGB's range, added before ratios are taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +185,12 @@ class Ghost:
     there: Mask  # (h, w) of the box
     owner: int  # index of the object beside it
     points: I64  # the object's control points that are nearest; empty where it is not lifted
+    tint: float  # of how much darker it is than the plate, by how much that differs in its channels
+
+    @property
+    def may_be_shade(self) -> bool:
+        """Whether it may be the object's shadow."""
+        return self.tint < TINTED
 
 
 def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
@@ -212,8 +221,19 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
         row, column = np.unravel_index(int(np.argmin(gaps[owner])), there.shape)
         foot = np.array([column + x0 + plate.left, row + y0 + plate.top])
         points = _nearest_points(document.objects[owner], document.photo.camera, foot)
-        ghosts.append(Ghost(box, there, owner, points))
+        ghosts.append(Ghost(box, there, owner, points, _tint(document, plate, box, there)))
     return tuple(ghosts)
+
+
+def _tint(document: Document, plate: Plate, box: Box, there: Mask) -> float:
+    """`Ghost.tint` of what is `there` (h, w) in a box; infinite where it is brighter."""
+    x0, y0, x1, y1 = box
+    photo = document.photo.pixels[plate.top : plate.box[3], plate.left : plate.box[2]]
+    seen, behind = (
+        unit_pixels(image[y0:y1, x0:x1][there]).mean(0) + BLACK for image in (photo, plate.pixels)
+    )
+    change = np.log(seen / behind)
+    return float(np.ptp(change) / -change.mean()) if change.max() < 0 else np.inf
 
 
 def _away(item: EditObject, box: Box) -> F32:
@@ -237,14 +257,24 @@ def _nearest_points(item: EditObject, camera: Camera, foot: F64 | I64) -> I64:
     return np.argsort(np.linalg.norm(rest - foot, axis=1))[:NEAREST]
 
 
+def keeps_shade(item: EditObject, document: Document) -> bool:
+    """Whether it is only turned where it stands: its shadow in the photo is still about right."""
+    is_bare = item.pose is None and item.shadow.strength == 0
+    return item.is_visible and is_bare and is_in_place(item, document)
+
+
 def shown_shares(
     document: Document, ghosts: Sequence[Ghost], holes: Sequence[Matte]
 ) -> tuple[float, ...]:
-    """In [0, 1] how much of each ghost is gone; `holes` are where objects were and are not."""
+    """In [0, 1] how much of each ghost is gone; `holes` are where objects were and are not.
+
+    The shadow of what is only turned where it stands stays.
+    """
     shares = []
     for ghost in ghosts:
         item = document.objects[ghost.owner]
         is_gone = any(item.matte is hole for hole in holes)
+        is_gone &= not (ghost.may_be_shade and keeps_shade(item, document))
         px = _moved_by(item, document.photo.camera, ghost.points) if is_gone else 0.0
         share = np.clip((px - MOVED[0]) / (MOVED[1] - MOVED[0]), 0, 1)
         shares.append(float(np.rint(share * STEPS) / STEPS))
@@ -291,8 +321,6 @@ def with_ghosts(
 # What of it may be a part of the object, to be added to its selection.
 
 LEAST_PART = 1.5  # x hole margin, squared: a smaller piece is hardly worth a question
-SHADE = 0.25  # of a darkening, by how much it may differ between the channels of a shadow
-BLACK = 0.02  # of sRGB's range, added before ratios are taken
 
 
 def left_out(document: Document, ghosts: Sequence[Ghost], margin: float) -> tuple[Ghost, ...]:
@@ -300,24 +328,10 @@ def left_out(document: Document, ghosts: Sequence[Ghost], margin: float) -> tupl
 
     `margin` is the photo's `hole_margin`, px.
     """
-    plate = document.plate
-    if plate is None:
+    if document.plate is None:
         return ()
-    photo = document.photo.pixels[plate.top : plate.box[3], plate.left : plate.box[2]]
-
-    def is_part(ghost: Ghost) -> bool:
-        if np.count_nonzero(ghost.there) < (LEAST_PART * margin) ** 2:
-            return False
-        x0, y0, x1, y1 = ghost.box
-        seen, behind = (
-            unit_pixels(image[y0:y1, x0:x1][ghost.there]).mean(0) + BLACK
-            for image in (photo, plate.pixels)
-        )
-        change = np.log(seen / behind)
-        is_shadow = change.max() < 0 and np.ptp(change) < SHADE * -change.mean()
-        return not is_shadow
-
-    return tuple(ghost for ghost in ghosts if is_part(ghost))
+    least = (LEAST_PART * margin) ** 2
+    return tuple(g for g in ghosts if np.count_nonzero(g.there) >= least and g.tint >= SHADE)
 
 
 def with_parts(mask: Mask, document: Document, parts: Sequence[Ghost], margin: float) -> Mask:
