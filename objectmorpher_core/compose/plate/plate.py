@@ -38,6 +38,8 @@ REACH = 3.0  # x hole margin: the fill's colour is corrected about so far into t
 COARSE = 4.0  # px of hole margin at which the correction is computed
 SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
 FAINT = 0.1  # of the logarithm of a fill: what is beside it by so little darker is no shadow
+UNSEEN = 0.995  # gain, from which nothing is seen of it
+TRUE = 0.05  # share of the fill in a coarse pixel that is still the photo's
 CONTEXT = 1.0  # x the hole's longer side, kept around it for the inpainter to copy from
 LEAST_CONTEXT = 64  # px
 STRIP = 256  # rows that are joined at a time: of 100 megapixels all at once take 10 GB
@@ -147,31 +149,41 @@ def correction(difference: F32, ring: Mask, margin: float) -> F32:
 
 def _coarse_correction(difference: F32, ring: Mask, margin: float) -> F32:
     """`correction` of what is 0 beside the ring (h, w, 3), as coarse as the margin allows."""
-    mean, share = _spread(difference, ring, margin)
-    mean *= share[..., None]
+    if not ring.any():
+        return np.zeros((1, 1, 3), np.float32)
+    size, scale = _coarse_size(ring, margin), _coarseness(margin)
+    known = cv2.resize(ring.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    values = cv2.resize(difference, size, interpolation=cv2.INTER_AREA)
+    spread = np.asarray(values, np.float32), np.asarray(known, np.float32)
+    mean, near = _spread(*spread, REACH * margin * scale)
+    mean *= near[..., None]
     return mean
 
 
-def _spread(values: F32, ring: Mask, margin: float) -> tuple[F32, F32]:
-    """The mean around each place of what is 0 beside the ring (h, w, 3), coarsely, and how near.
+def _coarseness(margin: float) -> float:
+    """The size of a coarse picture, x the photo's."""
+    return min(COARSE / margin, 1.0)
 
-    Shepard's interpolation with a heavy-tailed kernel. How near is 1 at the ring and falls to 0.
+
+def _coarse_size(mask: Mask, margin: float) -> tuple[int, int]:
+    """Width and height of the coarse picture of a mask (h, w)."""
+    return tuple(max(round(n * _coarseness(margin)), 1) for n in mask.shape[::-1])
+
+
+def _spread(values: F32, known: F32, reach: float) -> tuple[F32, F32]:
+    """The mean around each place of `values` (h, w, 3), 0 where nothing is `known` (h, w).
+
+    And how near that is, falling from 1 over the `reach`, px. Shepard's interpolation with a
+    heavy-tailed kernel.
     """
-    height, width = ring.shape
-    if not ring.any():
-        return np.zeros((1, 1, 3), np.float32), np.zeros((1, 1), np.float32)
-    scale = min(COARSE / margin, 1.0)
-    size = (max(round(width * scale), 1), max(round(height * scale), 1))
-    known = cv2.resize(ring.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    fewer = cv2.resize(values, size, interpolation=cv2.INTER_AREA)
-    total, mean = np.zeros_like(known), np.zeros_like(fewer)
+    total, mean = np.zeros_like(known), np.zeros_like(values)
     for n, sigma in enumerate(SIGMAS):
         share = 100.0**-n
         total += share * cv2.GaussianBlur(known, (0, 0), sigma)
-        mean += share * cv2.GaussianBlur(fewer, (0, 0), sigma)
+        mean += share * cv2.GaussianBlur(values, (0, 0), sigma)
     mean /= np.maximum(total, 1e-12)[..., None]
     away = cv2.distanceTransform((known <= 0).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.asarray(mean, np.float32), np.exp(-away / (REACH * margin * scale))
+    return np.asarray(mean, np.float32), np.exp(-away / reach)
 
 
 def _enlarged(small: F32, shape: tuple[int, ...]) -> F32:
@@ -230,34 +242,60 @@ def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: flo
 
     What a turn uncovers lies in the shadow that is left, which the fill has ended.
     """
-    x0, y0, x1, y1 = plate.box
-    covered = np.zeros(plate.hole.shape, bool)
+    (x0, y0, x1, y1), hole, scale = plate.box, plate.hole, _coarseness(margin)
+    size = _coarse_size(hole, margin)
+
+    def coarse(image: np.ndarray) -> F32:
+        return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
+
+    own = coarse((hole if plate.painted is None else hole & ~plate.painted).astype(np.float32))
+    covered = np.zeros(own.shape, bool)
     for matte in still:
-        covered |= crop(matte.alpha, matte.box, plate.box) > 0
-    own = plate.hole & (distance(covered) < SEAM * margin)
-    if plate.painted is not None:
-        own &= ~plate.painted
-    ring = ~plate.hole & (distance(own) < margin)
-    beside, near = _spread(_logarithm(photo[y0:y1, x0:x1], ring), ring, margin)
-    usual, _ = _spread(_logarithm(plate.pixels, own), own, margin)
+        covered |= coarse(crop(matte.alpha, matte.box, plate.box)) > 0
+    own *= distance(covered) < SEAM * margin * scale + 1
+    ring = (coarse(hole.astype(np.float32)) < TRUE) & (distance(own > 0) < margin * scale + 1)
+    seen, fill = (
+        np.log(coarse(image) / np.iinfo(image.dtype).max + BLACK)
+        for image in (photo[y0:y1, x0:x1], plate.pixels)
+    )
+    sure = own > 0.5
+    reach = REACH * margin * scale
+    beside, near = _spread(seen * ring[..., None], ring.astype(np.float32), reach)
+    usual, _ = _spread(fill * sure[..., None], sure.astype(np.float32), reach)
     darker = np.minimum(beside - usual + FAINT, 0) * np.minimum(2 * near, 1)[..., None]
-    change, least = _enlarged(darker, own.shape), _enlarged(beside - FAINT, own.shape)
+    darker *= (own > 0)[..., None]
     pixels = plate.pixels.copy()
-    for first in range(0, len(pixels), STRIP):
-        strip = slice(first, first + STRIP)
-        there = own[strip]
-        fill = _logarithm(pixels[strip], there)[there]
-        shaded = np.clip(fill + change[strip][there], np.minimum(fill, least[strip][there]), fill)
-        pixels[strip][there] = pixels_from_unit(np.exp(shaded) - BLACK, pixels.dtype)
+    least = np.asarray(np.exp(beside - FAINT) - BLACK, np.float32)
+    _darken(pixels, hole, np.exp(darker), least)
     return replace(plate, pixels=pixels)
 
 
-def _logarithm(pixels: Pixels, where: Mask) -> F32:
-    """(h, w, 3) of pixels `where` (h, w), 0 elsewhere."""
-    values = unit_pixels(pixels) + np.float32(BLACK)
-    np.log(values, out=values)
-    values *= where[..., None]
-    return values
+def _darken(pixels: Pixels, hole: Mask, gain: F32, least: F32) -> None:
+    """Multiplies pixels (H, W, 3) in the hole (H, W) by a coarse gain (h, w, 3), in place.
+
+    Not below `least` (h, w, 3).
+    """
+    height, width = hole.shape
+    across, down = gain.shape[1] / width, gain.shape[0] / height
+    is_dark = np.asarray((gain < UNSEEN).any((1, 2)))
+    for first in range(0, height, STRIP):
+        strip = slice(first, min(first + STRIP, height))
+        if not is_dark[max(int(down * first) - 1, 0) : int(down * strip.stop) + 2].any():
+            continue
+        # From the centres of the strip's pixels to those of the coarse picture.
+        place = np.array([[across, 0, 0.5 * across - 0.5], [0, down, down * (first + 0.5) - 0.5]])
+        more, floor = (
+            cv2.warpAffine(
+                field, place, (width, strip.stop - first), borderMode=cv2.BORDER_REPLICATE,
+                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            )
+            for field in (gain, least)
+        )  # fmt: skip
+        there = hole[strip] & (np.minimum.reduce(cv2.split(more)) < UNSEEN)
+        fill = unit_pixels(pixels[strip][there])
+        dark = (fill + BLACK) * more[there] - BLACK
+        dark = np.clip(dark, np.minimum(fill, floor[there]), fill)
+        pixels[strip][there] = pixels_from_unit(dark, pixels.dtype)
 
 
 def plate_picture(document: Document) -> Pixels:
