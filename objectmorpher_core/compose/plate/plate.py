@@ -22,6 +22,7 @@ from .. import Inpainter, InpaintError, LooksFar, TakesHints
 from ..blend import Box, distance
 from .residue import (
     BLACK,
+    TINTED,
     Ghost,
     find_ghosts,
     find_residue,
@@ -37,6 +38,7 @@ SEAM = 0.45  # x hole margin, width of the seam around the object
 REACH = 3.0  # x hole margin: the fill's colour is corrected about so far into the hole
 COARSE = 4.0  # px of hole margin at which the correction is computed
 SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
+NO_SHADE = 0.6  # tint, from which what is darker is no shadow; see `residue.Ghost`
 FAINT = 0.1  # of the logarithm of a fill: what is beside it by so little darker is no shadow
 UNSEEN = 0.995  # gain, from which nothing is seen of it
 TRUE = 0.05  # share of the fill in a coarse pixel that is still the photo's
@@ -240,7 +242,8 @@ def shaded(document: Document, holes: tuple[Matte, ...]) -> tuple[Matte, ...]:
 def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: float) -> Plate:
     """`plate` as dark behind what `still` stands there as the photo is beside that.
 
-    What a turn uncovers lies in the shadow that is left, which the fill has ended.
+    What a turn uncovers lies in the shadow that is left, which the fill has ended. What differs
+    more in colour is another thing.
     """
     (x0, y0, x1, y1), hole, scale = plate.box, plate.hole, _coarseness(margin)
     size = _coarse_size(hole, margin)
@@ -262,8 +265,10 @@ def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: flo
     reach = REACH * margin * scale
     beside, near = _spread(seen * ring[..., None], ring.astype(np.float32), reach)
     usual, _ = _spread(fill * sure[..., None], sure.astype(np.float32), reach)
-    darker = np.minimum(beside - usual + FAINT, 0) * np.minimum(2 * near, 1)[..., None]
-    darker *= (own > 0)[..., None]
+    darker = np.minimum(beside - usual + FAINT, 0)
+    tint = np.ptp(darker, axis=-1) / np.maximum(-darker.mean(-1), 1e-6)
+    share = np.minimum(2 * near, 1) * np.clip((NO_SHADE - tint) / (NO_SHADE - TINTED), 0, 1)
+    darker *= (share * (own > 0))[..., None]
     pixels = plate.pixels.copy()
     least = np.asarray(np.exp(beside - FAINT) - BLACK, np.float32)
     _darken(pixels, hole, np.exp(darker), least)

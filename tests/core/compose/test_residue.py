@@ -146,27 +146,27 @@ def test_a_ghost_goes_with_what_stands_beside_it(footless: Document):
 
 def test_what_a_turn_uncovers_lies_in_the_shadow_that_is_left_beside_it():
     _, behind, own = _scene("patch", "astronaut", "wood")
-    mask = np.zeros_like(own)
+    mask, beside, view = np.zeros_like(own), np.zeros_like(own), camera(WIDTH, HEIGHT)
     mask[120:260, 180:300] = True
-    shadow = np.zeros_like(own)
-    shadow[140:260, 300:400] = True
-    dark = np.where(shadow[..., None], np.rint(0.25 * behind), behind).astype(np.uint8)
-    pixels = np.where(mask[..., None], np.uint8([40, 90, 200]), dark)
-    view = camera(WIDTH, HEIGHT)
-    document = Document(Photo(Picture(pixels), view, png(pixels), "patch.png"))
-    document = edits.set_mask(edits.add_object(document), 0, mask, Prompt())
-    document = edits.set_lifted(document, 0, *lift_mask(pixels, view, mask, "relief"))
-    plate = build_plate(behind, _away(mask) < 3, compose.load("telea"))  # a ground without it
-    document = edits.set_plate(document, plate)
+    beside[140:260, 300:400] = True
+    plate = build_plate(behind, _away(mask) < 3, compose.load("telea"))  # with nothing beside
 
-    def shown(placement: Placement) -> float:
-        """How bright the ground is where the thing was, beside the shadow, x without it."""
+    def shown(colours: np.ndarray, placement: Placement) -> float:
+        """How bright the ground is where a thing was that has `colours` beside it."""
+        pixels = np.where(beside[..., None], np.rint(colours), behind).astype(np.uint8)
+        pixels = np.where(mask[..., None], np.uint8([40, 90, 200]), pixels)
+        document = Document(Photo(Picture(pixels), view, png(pixels), "patch.png"))
+        document = edits.set_mask(edits.add_object(document), 0, mask, Prompt())
+        document = edits.set_lifted(document, 0, *lift_mask(pixels, view, mask, "relief"))
+        document = edits.set_plate(document, plate)
         picture = composite(edits.set_placement(document, 0, placement)).pixels
         there = np.s_[160:240, 284:297]
         return float(picture[there].mean() / behind[there].mean())
 
-    assert shown(Placement(turn=(60.0, 0.0, 0.0))) < 0.5
-    assert shown(Placement(move=(-200.0, 0.0))) > 0.9
+    turned, away = Placement(turn=(60.0, 0.0, 0.0)), Placement(move=(-200.0, 0.0))
+    assert shown(0.25 * behind, turned) < 0.5
+    assert shown(0.25 * behind, away) > 0.9
+    assert shown(np.array([120.0, 0.0, 10.0]), turned) > 0.9, "of another colour: no shadow"
 
 
 def test_a_part_that_was_left_out_can_be_added(footless: Document):
