@@ -207,7 +207,7 @@ SOFT = 0.02  # x extent, over which one gives way to the other
 ALONE = 0.95  # share, from which a body is nothing but the shape there
 ALONG = 0.05  # x extent, over which a tube's middle is smoothed
 INNER = 0.02  # x extent from the outline, nearer to which fronts are hardly compared
-AT_RIM = 0.05  # of a weight, that is left there
+AT_RIM = 0.2  # of a weight, that is left there
 
 
 def completed(
