@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.spreading import spread
 from objectmorpher_core.lift.shapes import laid, rims_of
 from objectmorpher_core.lift.shapes.rims import Rim, at_edge
 from objectmorpher_core.lift.shapes.solids import Mesh, RayGrid, drawn, ellipsoid, revolved
@@ -104,6 +106,27 @@ def test_a_cup_stands_on_a_saucer_that_goes_on_behind_it() -> None:
     assert (off - np.median(off)).std() < 0.02
     rows, columns = found.behind.beside[hidden][:, ::-1].T
     assert not hidden[rows, columns].any(), "its colours are from where it is seen"
+
+
+def test_beside_a_cup_its_saucer_has_colours_of_its_own() -> None:
+    _, found, _, _ = _laid(_both())
+    outline, behind = found.silhouette, found.behind
+    assert behind is not None
+    surface, spacing = spread(found, 6000, 2.0, np.random.default_rng(0))
+    dish = outline.inside & ~behind.stands
+    away = cv2.distanceTransform((~behind.stands).astype(np.uint8), cv2.DIST_L2, 5) * outline.cell
+
+    def cells(xy: F64) -> tuple[np.ndarray, ...]:
+        at = np.rint(outline.grid_xy(xy)).astype(int)
+        return tuple(np.clip(at, 0, np.array(outline.shape[::-1]) - 1).T[::-1])
+
+    at = cells(surface.xy)
+    beside = surface.is_front & dish[at] & (away[at] < spacing)
+    assert beside.sum() > 50
+    assert not surface.is_seen[beside].any(), "there the photo mixes it with the cup"
+    assert dish[cells(surface.color_xy[beside])].all()
+    clear = surface.is_front & dish[at] & (away[at] > 2 * spacing)
+    assert surface.is_seen[clear].mean() > 0.9
 
 
 def test_a_lip_is_where_the_photo_has_its_edge_also_off_the_saucers_middle() -> None:
