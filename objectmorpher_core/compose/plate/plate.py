@@ -270,8 +270,11 @@ def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: flo
     share = np.minimum(2 * near, 1) * np.clip((NO_SHADE - tint) / (NO_SHADE - TINTED), 0, 1)
     darker *= (share * (own > 0))[..., None]
     pixels = plate.pixels.copy()
+    gain = np.exp(darker)
+    if gain.min() >= UNSEEN:
+        return plate
     least = np.asarray(np.exp(beside - FAINT) - BLACK, np.float32)
-    _darken(pixels, hole, np.exp(darker), least)
+    _darken(pixels, hole, gain, least)
     return replace(plate, pixels=pixels)
 
 

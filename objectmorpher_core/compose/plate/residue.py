@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
-from ...document.model import Document, EditObject, Matte, Plate
+from ...document.model import Document, EditObject, Matte, Placement, Plate
 from ...document.placement import is_in_place
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
@@ -258,9 +258,8 @@ def _nearest_points(item: EditObject, camera: Camera, foot: F64 | I64) -> I64:
 
 
 def keeps_shade(item: EditObject, document: Document) -> bool:
-    """Whether it is only turned where it stands: its shadow in the photo is still about right."""
-    is_bare = item.pose is None and item.shadow.strength == 0
-    return item.is_visible and is_bare and is_in_place(item, document)
+    """Whether it still stands where it did, however turned: its shadow there is about right."""
+    return item.is_visible and item.shadow.strength == 0 and is_in_place(item, document)
 
 
 def shown_shares(
@@ -268,27 +267,28 @@ def shown_shares(
 ) -> tuple[float, ...]:
     """In [0, 1] how much of each ghost is gone; `holes` are where objects were and are not.
 
-    The shadow of what is only turned where it stands stays.
+    The shadow of what is turned where it stands goes only as far as a pose moves what is beside.
     """
     shares = []
     for ghost in ghosts:
-        item = document.objects[ghost.owner]
-        is_gone = any(item.matte is hole for hole in holes)
-        is_gone &= not (ghost.may_be_shade and keeps_shade(item, document))
-        px = _moved_by(item, document.photo.camera, ghost.points) if is_gone else 0.0
+        item, camera = document.objects[ghost.owner], document.photo.camera
+        px = 0.0
+        if any(item.matte is hole for hole in holes):
+            stays = ghost.may_be_shade and keeps_shade(item, document)
+            px = _moved_by(replace(item, placement=Placement()) if stays else item, camera, ghost)
         share = np.clip((px - MOVED[0]) / (MOVED[1] - MOVED[0]), 0, 1)
         shares.append(float(np.rint(share * STEPS) / STEPS))
     return tuple(shares)
 
 
-def _moved_by(item: EditObject, camera: Camera, points: I64) -> float:
-    """Px by which those control points of an object are not where they were; the farthest."""
+def _moved_by(item: EditObject, camera: Camera, ghost: Ghost) -> float:
+    """Px by which the object's control points beside a ghost are not where they were; the most."""
     if not item.is_visible:
         return np.inf
     if item.lifted is None:
         return 0.0
-    rest = item.lifted.control_points[points].astype(np.float64)
-    posed = rest if item.pose is None else item.pose.points[points]
+    rest = item.lifted.control_points[ghost.points].astype(np.float64)
+    posed = rest if item.pose is None else item.pose.points[ghost.points]
     motion = item.placement.matrix(item.lifted, camera)
     world = item.lifted.world_points(posed) @ motion[:3, :3].T + motion[:3, 3]
     if (world[:, 2] <= 0).any():
