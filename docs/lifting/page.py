@@ -99,7 +99,10 @@ cells, and its normals there were those of steps. Now rims lie where the matte i
 sheets end there, walls have the rim's normals, and a recognised shape goes on beyond where its own
 picture ends. At turn 20, turn 35 and pitch 20 the wobble of the ten was 1.32, 1.42 and 1.36 before,
 and 1.40, 1.41 and 1.63 of those held out. What is left of box and brick is at hidden corners, of
-the mug at 35 degrees it is the handle, which in truth comes before the body.
+the mug at 35 degrees it is the handle, which in truth comes before the body: as a round tube in the
+plane of the axis, at its true angle, it would take a turn by 20 degrees from 16.3 dB and an IoU of
+0.837 to 21.8 and 0.952. The network does not see that angle: of handles at -33 to 41 degrees to the
+side it says 1 to 23.
 
 A box is fitted to what the network sees on a coarse grid, and then once more to its outline, whose
 six corners say nearly all of it. What the network sees at such a box's corners counts less then,
@@ -175,9 +178,9 @@ does, about its own upright. Wobble is that of the turned outline over that at r
 """
 LOOKED = """\
 Each picture was looked at. The coffee spins on its table, which holds up to 35 degrees; at the
-cup's limb are jags, and a nib where the spoon touches the lip; its handle and spoon lie flat on the
-saucer. Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right, the
-astronaut nearly so: her head is a little deep, and what is not shown of her neck is uneven. The
+cup's limb are small jags, and a nib where the spoon touches the lip; its handle and spoon lie flat
+on the saucer. Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right,
+the astronaut nearly so: her head is a little deep, and what is not shown of her neck is uneven. The
 horse is a sheet, as it was drawn. What does not look right: the cat's fur at the upper
 left is coarse; the fig in the bowl becomes narrow, and slides at 35, where a strand stands off the
 bowl's edge; the photographer's back has a grey band; the clock, which is blurred, has a double
