@@ -268,11 +268,10 @@ def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: flo
     darker = np.minimum(beside - usual + FAINT, 0)
     tint = np.ptp(darker, axis=-1) / np.maximum(-darker.mean(-1), 1e-6)
     share = np.minimum(2 * near, 1) * np.clip((NO_SHADE - tint) / (NO_SHADE - TINTED), 0, 1)
-    darker *= (share * (own > 0))[..., None]
-    pixels = plate.pixels.copy()
-    gain = np.exp(darker)
+    gain = np.exp(darker * (share * (own > 0))[..., None])
     if gain.min() >= UNSEEN:
         return plate
+    pixels = plate.pixels.copy()
     least = np.asarray(np.exp(beside - FAINT) - BLACK, np.float32)
     _darken(pixels, hole, gain, least)
     return replace(plate, pixels=pixels)

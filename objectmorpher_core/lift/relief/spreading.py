@@ -168,10 +168,8 @@ def spread(
     front, back, *others = _thinned(clouds, first, spacing, rng)
     sheets = [_sheet(body, drawn[0][front], FRONT), _sheet(body, drawn[1][back], BACK)]
     if body.behind is not None:
-        sheets[0], around[0] = (
-            _own(sheets[0], body, spacing),
-            (_own(around[0][0], body, spacing), 0),
-        )
+        sheets[0] = _own(sheets[0], body, spacing)
+        around[0] = (_own(around[0][0], body, spacing), 0)
     sheets += [surface.select(kept) for (surface, _), kept in zip(around, others, strict=True)]
     sheets.append(_wall(body, lines, spacing))
     if solid is not None:
