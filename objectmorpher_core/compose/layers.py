@@ -58,8 +58,9 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
     photo, size = document.photo.pixels, document.photo.size
     pile: list[Layer] = []
     own = plate_of_holes(document, holes(document)) if result.stack else document.plate
-    if document.plate is not None and (own is None or own.hole is not document.plate.hole):
-        pile.append(_background(EMPTY, document.plate, is_shown=False))
+    whole = document.plate
+    if own is not None and whole is not None and own.hole is not whole.hole:  # not merely darker
+        pile.append(_background(EMPTY, whole, is_shown=False))
     if own is not None and own.hole.any():
         pile.append(_background(BACKGROUND, own))
     shown = [thing for thing in result.stack if thing.item.is_visible]

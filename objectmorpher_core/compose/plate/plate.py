@@ -28,6 +28,7 @@ from .residue import (
     find_residue,
     keeps_shade,
     shown_shares,
+    tint_of,
     visible_residue,
     with_ghosts,
 )
@@ -153,30 +154,29 @@ def _coarse_correction(difference: F32, ring: Mask, margin: float) -> F32:
     """`correction` of what is 0 beside the ring (h, w, 3), as coarse as the margin allows."""
     if not ring.any():
         return np.zeros((1, 1, 3), np.float32)
-    size, scale = _coarse_size(ring, margin), _coarseness(margin)
-    known = cv2.resize(ring.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    values = cv2.resize(difference, size, interpolation=cv2.INTER_AREA)
-    spread = np.asarray(values, np.float32), np.asarray(known, np.float32)
-    mean, near = _spread(*spread, REACH * margin * scale)
+    known, values = _coarse(ring.astype(np.float32), margin), _coarse(difference, margin)
+    mean, near = _spread(values, known, REACH * margin * _coarseness(margin))
     mean *= near[..., None]
     return mean
 
 
 def _coarseness(margin: float) -> float:
-    """The size of a coarse picture, x the photo's."""
+    """Px of a coarse picture per px of the photo."""
     return min(COARSE / margin, 1.0)
 
 
-def _coarse_size(mask: Mask, margin: float) -> tuple[int, int]:
-    """Width and height of the coarse picture of a mask (h, w)."""
-    return tuple(max(round(n * _coarseness(margin)), 1) for n in mask.shape[::-1])
+def _coarse(image: np.ndarray, margin: float) -> F32:
+    """Return `image` (h, w, ...) as coarse as the margin allows."""
+    width, height = (max(round(n * _coarseness(margin)), 1) for n in image.shape[1::-1])
+    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, np.float32)
 
 
 def _spread(values: F32, known: F32, reach: float) -> tuple[F32, F32]:
-    """The mean around each place of `values` (h, w, 3), 0 where nothing is `known` (h, w).
+    """Return the mean of `values` (h, w, 3) around each place, and how near to it they are.
 
-    And how near that is, falling from 1 over the `reach`, px. Shepard's interpolation with a
-    heavy-tailed kernel.
+    They are 0 where nothing is `known` (h, w). How near is 1 where something is, and falls over the
+    `reach`, px. Shepard's interpolation with a heavy-tailed kernel.
     """
     total, mean = np.zeros_like(known), np.zeros_like(values)
     for n, sigma in enumerate(SIGMAS):
@@ -231,7 +231,7 @@ def plate_of_holes(
 
 
 def shaded(document: Document, holes: tuple[Matte, ...]) -> tuple[Matte, ...]:
-    """Those of the `holes` in which the shadow beside them goes on."""
+    """Return the `holes` behind which a shadow beside them goes on: their things only turned."""
     return tuple(
         item.matte
         for item in document.objects
@@ -240,40 +240,35 @@ def shaded(document: Document, holes: tuple[Matte, ...]) -> tuple[Matte, ...]:
 
 
 def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: float) -> Plate:
-    """`plate` as dark behind what `still` stands there as the photo is beside that.
+    """Return `plate` with the shadows beside things that only turned going on behind these.
 
-    What a turn uncovers lies in the shadow that is left, which the fill has ended. What differs
-    more in colour is another thing.
+    `still` are the things' mattes. The fill ends such a shadow at the outline, and a turn would
+    show that. What differs from the fill in its colour, too, is no shadow.
     """
-    (x0, y0, x1, y1), hole, scale = plate.box, plate.hole, _coarseness(margin)
-    size = _coarse_size(hole, margin)
-
-    def coarse(image: np.ndarray) -> F32:
-        return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
-
-    own = coarse((hole if plate.painted is None else hole & ~plate.painted).astype(np.float32))
+    (x0, y0, x1, y1), hole = plate.box, plate.hole
+    open_hole = hole if plate.painted is None else hole & ~plate.painted
+    own = _coarse(open_hole.astype(np.float32), margin)
     covered = np.zeros(own.shape, bool)
     for matte in still:
-        covered |= coarse(crop(matte.alpha, matte.box, plate.box)) > 0
-    own *= distance(covered) < SEAM * margin * scale + 1
-    ring = (coarse(hole.astype(np.float32)) < TRUE) & (distance(own > 0) < margin * scale + 1)
+        covered |= _coarse(crop(matte.alpha, matte.box, plate.box), margin) > 0
+    wide, reach = (px * margin * _coarseness(margin) for px in (1.0, REACH))
+    own *= distance(covered) < SEAM * wide + 1
+    is_true = _coarse(hole.astype(np.float32), margin) < TRUE
+    ring, sure = is_true & (distance(own > 0) < wide + 1), own > 0.5
     seen, fill = (
-        np.log(coarse(image) / np.iinfo(image.dtype).max + BLACK)
+        np.log(_coarse(image, margin) / np.iinfo(image.dtype).max + BLACK)
         for image in (photo[y0:y1, x0:x1], plate.pixels)
     )
-    sure = own > 0.5
-    reach = REACH * margin * scale
     beside, near = _spread(seen * ring[..., None], ring.astype(np.float32), reach)
     usual, _ = _spread(fill * sure[..., None], sure.astype(np.float32), reach)
     darker = np.minimum(beside - usual + FAINT, 0)
-    tint = np.ptp(darker, axis=-1) / np.maximum(-darker.mean(-1), 1e-6)
-    share = np.minimum(2 * near, 1) * np.clip((NO_SHADE - tint) / (NO_SHADE - TINTED), 0, 1)
-    gain = np.exp(darker * (share * (own > 0))[..., None])
+    is_shade = np.clip((NO_SHADE - tint_of(darker)) / (NO_SHADE - TINTED), 0, 1)
+    share = np.minimum(2 * near, 1) * is_shade * (own > 0)
+    gain = np.exp(darker * share[..., None])
     if gain.min() >= UNSEEN:
         return plate
     pixels = plate.pixels.copy()
-    least = np.asarray(np.exp(beside - FAINT) - BLACK, np.float32)
-    _darken(pixels, hole, gain, least)
+    _darken(pixels, hole, gain, np.asarray(np.exp(beside - FAINT) - BLACK, np.float32))
     return replace(plate, pixels=pixels)
 
 

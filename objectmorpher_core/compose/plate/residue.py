@@ -185,7 +185,7 @@ class Ghost:
     there: Mask  # (h, w) of the box
     owner: int  # index of the object beside it
     points: I64  # the object's control points that are nearest; empty where it is not lifted
-    tint: float  # of how much darker it is than the plate, by how much that differs in its channels
+    tint: float  # see `tint_of`; infinite where it is not darker than the plate
 
     @property
     def may_be_shade(self) -> bool:
@@ -226,14 +226,22 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
 
 
 def _tint(document: Document, plate: Plate, box: Box, there: Mask) -> float:
-    """`Ghost.tint` of what is `there` (h, w) in a box; infinite where it is brighter."""
+    """Return `Ghost.tint` of what is `there` (h, w) in a box of the plate."""
     x0, y0, x1, y1 = box
     photo = document.photo.pixels[plate.top : plate.box[3], plate.left : plate.box[2]]
     seen, behind = (
         unit_pixels(image[y0:y1, x0:x1][there]).mean(0) + BLACK for image in (photo, plate.pixels)
     )
     change = np.log(seen / behind)
-    return float(np.ptp(change) / -change.mean()) if change.max() < 0 else np.inf
+    return float(tint_of(change)) if change.max() < 0 else np.inf
+
+
+def tint_of(darker: np.ndarray) -> np.ndarray:
+    """Return how unlike the channels (..., 3) of a darkening are, over their mean.
+
+    `darker`: logarithms of ratios, 0 and less.
+    """
+    return np.asarray(np.ptp(darker, axis=-1) / np.maximum(-darker.mean(-1), 1e-6))
 
 
 def _away(item: EditObject, box: Box) -> F32:

@@ -20,9 +20,7 @@ SHARP = 0.75  # cosine of two faces' normals, below which the edge between them 
 OBLIQUE = 0.1  # cosine to the ray, up to which the photo shows nothing of a face
 INSET = 0.6  # x mean spacing: so far beyond its outermost points a surface is drawn
 IN_LINE = 0.85  # x mean spacing: how far points along an edge, or an outline, are apart
-BEVEL = (
-    0.1  # x mean spacing, by which a point on an edge lies within, so that it does not stick out
-)
+BEVEL = 0.1  # x mean spacing: so far within lie points on an edge, which would stick out
 
 
 class _Edge(NamedTuple):

@@ -251,8 +251,8 @@ def _sheet(body: ReliefBody, xy: F64, side: float) -> SurfacePoints:
 def _own(surface: SurfacePoints, body: ReliefBody, spacing: float) -> SurfacePoints:
     """`surface`, the front or the brim, with the colours of its own parts.
 
-    They show where the photo is drawn out too far, and beside the ends of parts, where the photo
-    mixes two of them.
+    These colours show where the photo is drawn out too far, and at the ends of parts, where the
+    photo mixes two of them.
     """
     outline, behind = body.silhouette, body.behind
     assert behind is not None, "parts are known"
@@ -267,7 +267,10 @@ def _own(surface: SurfacePoints, body: ReliefBody, spacing: float) -> SurfacePoi
 
 
 def _away_from_parts(body: ReliefBody, pad: int = 0) -> tuple[F64, F64]:
-    """(h, w) px to what stands before other parts, and to those; `pad` cells more on all sides."""
+    """(h, w) px to the part that stands before the others, and to the others.
+
+    There are `pad` cells more on each side.
+    """
     outline, behind = body.silhouette, body.behind
     assert behind is not None, "parts are known"
 
