@@ -32,6 +32,8 @@ UPSCALE = 1.0  # s that calls wait before another process is started: someone wa
 LOOK_BACK = 3.0  # s over which Ray Serve averages how many wait
 DOWNSCALE = 300.0  # s: a model that was loaded is soon wanted again
 HEALTH = 2.0  # s between two looks at each process
+DEADLINE = "RAY_SERVE_QUEUE_LENGTH_RESPONSE_DEADLINE_S"
+SAYS = 1.0  # s in which a process says that it is free; after Serve's .1 a slow one counts as busy
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,11 @@ class Cluster:
         made: Any = serve.deployment(serve.ingress()(Ingress))
         ingress = made.options(
             name="ingress", max_ongoing_requests=door.limits.connections,
-            ray_actor_options={"num_cpus": 0}, health_check_period_s=HEALTH,
-            graceful_shutdown_timeout_s=HEALTH, logging_config={"log_level": "WARNING"},
+            ray_actor_options={
+                "num_cpus": 0, "runtime_env": {"env_vars": {DEADLINE: str(SAYS)}},
+            },
+            health_check_period_s=HEALTH, graceful_shutdown_timeout_s=HEALTH,
+            logging_config={"log_level": "WARNING"},
         )  # fmt: skip
         bound = ingress.bind(door.token, door.limits, table, handles, site.offers, plan.most)
         serve.run(bound, name=NAME, route_prefix="/")

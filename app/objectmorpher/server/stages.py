@@ -91,13 +91,14 @@ class Stages:
 
         watcher = threading.Thread(target=watch, daemon=True)
         watcher.start()
+        outcome: JobOutcome | None = None
         try:
+            # To its end: until then Serve counts the process as busy, and sends others elsewhere.
             for item in stream:
                 what, value = cast(tuple[str, Any], item)
                 if what == DONE:
-                    if value is None:
-                        raise Cancelled
-                    return value
+                    outcome = value
+                    continue
                 if stop.is_set():
                     raise Cancelled
                 if what == STARTED:
@@ -110,7 +111,9 @@ class Stages:
             is_over.set()
             watcher.join()
             stream.cancel()  # of a job that goes on without us
-        raise Cancelled  # the stream was closed without an outcome
+        if outcome is None:  # it was cancelled there, or the stream closed without an outcome
+            raise Cancelled
+        return outcome
 
     def _store(self, call: Call) -> dict[str, Any]:
         """References to the call's large arrays in Ray's store, where each is put once."""
