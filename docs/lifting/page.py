@@ -27,8 +27,8 @@ a few plain shapes: a flat sheet, a box, an ellipsoid, a ring, a surface of revo
 is read off the outline. The one that describes the object in the fewest words takes the place of
 the network's surface as far as it explains it, rights how the whole leans, and gives the far side
 that no photo shows; where none does, the shape stays free. An outline that is mostly one ellipse is
-the rim of a plate or a bowl, and a second, nearer circle is the lip of a cup. `--shape`, or Kind in
-the Shape panel, overrules all that.
+the rim of a plate or a bowl, and a second, nearer circle is the lip of a cup. A handle lies in a
+plane through the axis of what it is on. `--shape`, or Kind in the Shape panel, overrules all that.
 
 How much of the truth is that? Solids whose every view is known are drawn into a photo (512 px, 50
 degrees of view, over a blurred picture, seen from 6 to 18 degrees above, the ring from 50), lifted
@@ -98,11 +98,25 @@ were the surface's: its rim stood on the mask's steps of a pixel, its points fil
 cells, and its normals there were those of steps. Now rims lie where the matte is half covered,
 sheets end there, walls have the rim's normals, and a recognised shape goes on beyond where its own
 picture ends. At turn 20, turn 35 and pitch 20 the wobble of the ten was 1.32, 1.42 and 1.36 before,
-and 1.40, 1.41 and 1.63 of those held out. What is left of box and brick is at hidden corners, of
-the mug at 35 degrees it is the handle, which in truth comes before the body: as a round tube in the
-plane of the axis, at its true angle, it would take a turn by 20 degrees from 16.3 dB and an IoU of
-0.837 to 21.8 and 0.952. The network does not see that angle: of handles at -33 to 41 degrees to the
-side it says 1 to 23.
+and 1.40, 1.41 and 1.63 of those held out. What is left of box and brick is at hidden corners.
+
+What sticks out of a surface of revolution and is thin, a handle or a spout, is a round rod in a
+plane through the axis. How that plane lies about the axis the shape network does not see: of
+handles at -33 to 41 degrees to the side it says 1 to 23. So three small networks look at the handle
+and at the body beside it (`objectmorpher_core/models/rods.onnx`, 0.6 MB, Apache-2.0, SHA-256
+`0a311cb6f459af978525b70d7cbabd507de129b04c8c5708b2e83fe0b32b8de5`). They read the tokens that the
+shape network reads, and were trained in seven minutes on 2,752 handles of made-up vessels
+(`objectmorpher train rods`; making those takes half an hour on two cores). Of 320 that were held
+out they are off by 5.8 degrees in the median and by 12.0 in the root mean square, of the surer half
+by 5.4 and 8.6; the azimuths spread by 30. One network alone is off by up to 12.8. Where they expect
+to be off by more than 29 degrees, the handle stays as it was.
+
+On four vessels at five azimuths each, with which the rods were made and by which the three networks
+were preferred to one (unlit, and so harder than photos: 13.7 degrees off for 18 to 21 of one), a
+turn by 20 degrees goes from 18.0 dB and an IoU of 0.883 to 19.5 and 0.917, a turn by 35 from 16.6
+and 0.844 to 17.7 and 0.880; with the true azimuth it would be 21.1 and 0.941, and 18.9 and 0.912.
+On two others at three azimuths each, on which nothing was chosen, from 18.7 and 0.904 to 19.0 and
+0.917, and from 17.1 and 0.859 to 17.1 and 0.875. The mug of the table was at 16.3 and 0.837.
 
 A box is fitted to what the network sees on a coarse grid, and then once more to its outline, whose
 six corners say nearly all of it. What the network sees at such a box's corners counts less then,

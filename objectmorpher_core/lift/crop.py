@@ -34,10 +34,15 @@ class Crop(NamedTuple):
         rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
         low, high = np.array([columns[0], rows[0]]), np.array([columns[-1], rows[-1]]) + 1
         side = int(np.ceil(ROOM * (high - low).max()))
-        left, top = np.rint(0.5 * (low + high - side)).astype(int)
-        middle = (np.array([left, top]) + 0.5 * side - [camera.cx, camera.cy]) / camera.focal
-        tangents = np.array([*middle, side / camera.focal], np.float32)
-        return Crop(int(left), int(top), side, tangents)
+        left, top = 0.5 * (low + high - side)
+        return Crop.at(float(left), float(top), side, camera)
+
+    @staticmethod
+    def at(left: float, top: float, side: float, camera: Camera) -> Crop:
+        """The nearest whole pixels of a square of photo px."""
+        x, y, wide = (round(float(n)) for n in (left, top, side))
+        middle = (np.array([x, y]) + 0.5 * wide - [camera.cx, camera.cy]) / camera.focal
+        return Crop(x, y, wide, np.array([*middle, wide / camera.focal], np.float32))
 
     @property
     def away(self) -> float:

@@ -9,9 +9,10 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, TypeVar
 
-# The program's own weights, which come with it (docs/shape_network, docs/compositing).
+# The program's own weights, which come with it (docs/shape_network, docs/lifting, docs/compositing).
 
-PACKAGE, SHAPE, SHADOW = "objectmorpher_core.models", "shape.onnx", "shadow.onnx"
+PACKAGE = "objectmorpher_core.models"
+SHAPE, RODS, SHADOW = "shape.onnx", "rods.onnx", "shadow.onnx"
 TOKENS = "dinov2-vits14"  # the weight whose tokens the shape network reads
 
 
@@ -23,6 +24,11 @@ def is_shipped() -> bool:
 def shape_network() -> bytes:
     """The shape network, an ONNX file. Raises FileNotFoundError."""
     return files(PACKAGE).joinpath(SHAPE).read_bytes()
+
+
+def rod_network() -> bytes:
+    """The rod network, an ONNX file. Raises FileNotFoundError."""
+    return files(PACKAGE).joinpath(RODS).read_bytes()
 
 
 def shadow_network() -> bytes:

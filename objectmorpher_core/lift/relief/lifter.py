@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
-from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of, rounded
+from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of, rod_look, rounded
 from . import shape_look
 from .body import MIDDLE, ReliefBody, closed, leaning
 from .canvas import ReliefCanvas, bilinear
@@ -137,7 +138,7 @@ class ReliefLifter:
                 if rims and rims[0].is_steep:  # what faces the camera may be a flower
                     body = laid(body, rims, seen, subject, settings.thickness)
                 else:
-                    body = _recognised(body, seen, camera, settings)
+                    body = _recognised(body, seen, subject, settings)
         if settings.kind == "tube":
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
@@ -168,14 +169,16 @@ class ReliefLifter:
 
 
 def _recognised(
-    body: ReliefBody, seen: shape_look.SeenShape, camera: Camera, settings: LiftSettings
+    body: ReliefBody, seen: shape_look.SeenShape, subject: LiftSubject, settings: LiftSettings
 ) -> ReliefBody:
     """`body` as the plain shape that it looks like, else leaning as far as things do."""
+    camera = subject.camera
     shape = recognised(seen, settings.kind)
     if shape is None or _contradicts(shape, body, settings):
         body = leaning(body, camera)
         return body if body.standing.prism is not None else closed(body)
-    return completed(body, shape, camera, settings.thickness, settings.trust)
+    azimuth_of = partial(rod_look.azimuth_of, subject.pixels, subject.mask)
+    return completed(body, shape, camera, settings.thickness, settings.trust, azimuth_of)
 
 
 def _contradicts(shape: Recognised, body: ReliefBody, settings: LiftSettings) -> bool:

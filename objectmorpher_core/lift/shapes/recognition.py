@@ -19,6 +19,7 @@ from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
 from .boxes import fit_box, fit_flat
 from .evidence import Evidence, Misfit
+from .rods import Axis, AzimuthOf, TurnedBody
 from .round import fit_ellipsoid, fit_revolution, fit_ring
 from .solids import Drawn, Mesh, RayGrid, drawn
 
@@ -73,6 +74,12 @@ class Recognised:
         up = -np.sign(up[1]) * up
         return up if -up[1] > LYING else None
 
+    def axis(self, size: float) -> Axis | None:
+        """Of a surface of revolution, `size` times as large and as far away."""
+        if self.kind != "round" or self.mesh is None or len(self.mesh.axes) != 1:
+            return None
+        return Axis(size * self.mesh.vertices.mean(0), self.mesh.axes[0])
+
     def over(self, outline: ReliefSilhouette, camera: Camera) -> PlacedShape:
         """The shape on the cells of a silhouette."""
         weight = min(self.weight / WHOLE, 1.0)
@@ -84,17 +91,17 @@ class Recognised:
             rays = np.concatenate([grid.tangents, np.ones((*grid.shape, 1))], -1)
             near = np.maximum(rays @ self.plane, 0.3 * float(np.median(rays @ self.plane)))
             whole = np.ones(outline.shape)
-            return PlacedShape(1 / near, 1 / near, whole, weight, whole > 0)
+            return PlacedShape(1 / near, 1 / near, whole, weight, whole > 0, whole > 0)
         assert self.mesh is not None
         seen = drawn(self.mesh, grid)
         met = (seen.near > 0) & outline.inside
         if not met.any():
             ones = np.ones(outline.shape)
-            return PlacedShape(ones, ones, 0 * ones, 0.0, met)
+            return PlacedShape(ones, ones, 0 * ones, 0.0, met, met)
         near, far = (1 / field for field in _carried_on(seen, met))
         gap = cv2.distanceTransform((~met).astype(np.uint8), cv2.DIST_L2, 3) * outline.cell
         share = np.clip(2 - gap / (REACH * outline.extent), 0, 1)
-        return PlacedShape(near, far, share, weight, gap < MISSED * outline.cell)
+        return PlacedShape(near, far, share, weight, met, gap < MISSED * outline.cell)
 
 
 def _carried_on(seen: Drawn, met: Mask) -> tuple[F64, F64]:
@@ -120,7 +127,8 @@ class PlacedShape:
     far: F64
     share: F64  # in [0, 1], of a place that is the shape's
     weight: float
-    is_met: Mask  # (h, w) by rays, or nearly
+    is_met: Mask  # (h, w) by rays
+    is_near: Mask  # (h, w) that, or nearly
 
 
 def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:
@@ -211,11 +219,13 @@ AT_RIM = 0.2  # of a weight, that is left there
 
 
 def completed(
-    body: ReliefBody, shape: Recognised, camera: Camera, thickness: float, trust: float
-) -> ReliefBody:
+    body: ReliefBody, shape: Recognised, camera: Camera, thickness: float, trust: float,
+    azimuth_of: AzimuthOf = lambda _: None,
+) -> ReliefBody:  # fmt: skip
     """`body`, whose thickness was multiplied by `thickness`, as `shape` as far as that is sure.
 
-    `trust` in [0, 1]: 0 leaves the body as it is. How far away it is the body says.
+    `trust` in [0, 1]: 0 leaves the body as it is. How far away it is the body says, and
+    `azimuth_of` how what sticks out of a surface of revolution lies about its axis.
     """
     outline, focal = body.silhouette, camera.focal
     places = shape.over(outline, camera)
@@ -240,8 +250,13 @@ def completed(
     middle = body.middle + share * (near - half - body.middle)
     body = replace(body, middle=middle, front=sides[0], back=sides[1], kind=shape.kind)
     body = replace(body, up=body.up if shape.up is None else shape.up)
-    own = (share > ALONE) & places.is_met & (thickness == 1)
-    return replace(_whole(body, share), solid=_solid_of(shape, own, away, camera))
+    own = (share > ALONE) & places.is_near & (thickness == 1)
+    body = replace(_whole(body, share), solid=_solid_of(shape, own, away, camera))
+    if (axis := shape.axis(np.exp(away))) is None:
+        return body
+    share = trust * places.weight
+    turned = TurnedBody(body, places.is_met, axis, camera, share, thickness)
+    return turned.with_rods(azimuth_of)
 
 
 def _solid_of(shape: Recognised, own: Mask, away: float, camera: Camera) -> PlainSolid | None:

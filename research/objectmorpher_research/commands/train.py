@@ -31,6 +31,10 @@ def add_train(parser: argparse.ArgumentParser) -> None:
             _train_shadow,
         ),
         Subcommand(
+            "rods", "the network that finds how handles lie, on made-up vessels", _add_rods,
+            _train_rods,
+        ),
+        Subcommand(
             "pairs", "triplets for the LoRA, out of pairs of pictures", _add_pairs, _make_pairs
         ),
         Subcommand(
@@ -58,6 +62,16 @@ def _add_shadow(parser: argparse.ArgumentParser) -> None:
     add("--steps", type=int, default=5000, metavar="N", help="of 32 samples, default 5000")
     add("--seed", type=int, default=0, help="another one draws other scenes")
     _add_run(parser, "shadow.onnx")
+
+
+def _add_rods(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Trains on made-up vessels with handles; those made are kept."
+    add = parser.add_argument
+    add("--samples", type=int, default=3072, metavar="N", help="handles to draw, default 3072")
+    add("--steps", type=int, default=2500, metavar="N", help="of 32 samples, default 2500")
+    add("--seed", type=int, default=0, help="another one draws other handles")
+    add("--folder", type=Path, required=True, metavar="DIR", help="what it is trained on")
+    add("-o", "--output", type=Path, metavar="F.onnx", help="default: rods.onnx in the folder")
 
 
 def _add_run(parser: argparse.ArgumentParser, weights: str) -> None:
@@ -274,6 +288,22 @@ def _train_shadow(options: argparse.Namespace) -> None:
         net = train(options.folder, plan, options.minutes, progress)
     output = options.output or options.folder / "shadow.onnx"
     print(f"{output}: {export(net, output)}")
+
+
+def _train_rods(options: argparse.Namespace) -> None:
+    """Makes handles, trains, measures, and writes weights."""
+    if absent := _absent(*NEEDED):
+        raise UsageError(f"training needs {absent}: `pip install {absent.replace(' and ', ' ')}`")
+    if min(options.samples, options.steps) < 1 or options.seed < 0:
+        raise UsageError("--samples and --steps are at least 1, --seed is not negative")
+    from ..training.train_rods import RodPlan, export, train
+
+    plan = RodPlan(options.samples, options.steps, seed=options.seed)
+    with progress_bar("training") as progress:
+        net, off = train(options.folder, plan, progress)
+    output = options.output or options.folder / "rods.onnx"
+    print(f"{output}: {export(net, output)}")
+    print(", ".join(f"{name} {value:.1f} degrees" for name, value in off.items()))
 
 
 def _train_shape(options: argparse.Namespace) -> None:

@@ -1,0 +1,92 @@
+"""A look by the rod network at a handle: its azimuth about the axis of what it is on.
+
+The networks are ours (`objectmorpher train rods`) and come with the program in one file; DINOv2,
+whose tokens they read, is fetched.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from functools import cache
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from ... import models
+from ...base.arrays import F32, RGB, Mask, Pixels
+from ...models import registry
+from ...models.onnx_session import open_session
+from ...segment import dino_tokens
+from ...segment.dino_tokens import PATCH
+from ..crop import SIDE
+from .rods import RodView
+
+GRID = SIDE // PATCH  # tokens on a side
+UNIT = 0.5  # radians, of the network's numbers
+KEPT = 4  # looks
+SURE = 0.5  # radians, expected error, from which nothing is known
+
+
+def planes_of(mask: Mask, rod: Mask) -> F32:
+    """(2, GRID, GRID) shares of each token that the object (SIDE, SIDE) and its rod cover."""
+    both = np.stack([mask, rod]).astype(np.float32)
+    return both.reshape(2, GRID, PATCH, GRID, PATCH).mean((2, 4))
+
+
+def azimuth_of(pixels: Pixels, mask: Mask, view: RodView) -> float | None:
+    """Radians, above 0 towards the camera, of a rod of `mask` (H, W) in a photo (H, W, 3).
+
+    None where the network cannot run, or is not sure.
+    """
+    if models.path(registry.TOKENS) is None:
+        return None
+    azimuth, error = _memory.look(view.crop.seen(pixels), view.crop.seen_mask(mask), view)
+    return azimuth if error < SURE else None
+
+
+def look(rgb: RGB, mask: Mask, rod: Mask, lean: float) -> tuple[float, float]:
+    """The azimuth and its expected error, radians, seen in a crop and in its mirror image.
+
+    `rgb` (SIDE, SIDE, 3), `mask` of the object and `rod` (SIDE, SIDE), `lean` as in `RodView`.
+    """
+    found = []
+    for mirror in (1, -1):
+        seen = np.ascontiguousarray(rgb[:, ::mirror])
+        tokens = dino_tokens.shared().inner_tokens(seen).transpose(2, 0, 1)
+        wanted = {
+            "tokens": np.ascontiguousarray(tokens)[None],
+            "planes": planes_of(mask[:, ::mirror], rod[:, ::mirror])[None],
+            "lean": np.array([lean / UNIT], np.float32),
+        }
+        found.append([float(value[0]) for value in _session().run(None, wanted)])
+    azimuths, doubts = np.array(found).T
+    error = np.sqrt(np.exp(2 * doubts).mean() + azimuths.var())
+    return UNIT * float(azimuths.mean()), UNIT * float(error)
+
+
+@cache
+def _session() -> Any:
+    return open_session(registry.rod_network())
+
+
+class _Memory:
+    """The last looks, known by the digest of what was seen: another thickness needs no other."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._looks: OrderedDict[bytes, tuple[float, float]] = OrderedDict()
+
+    def look(self, rgb: RGB, mask: Mask, view: RodView) -> tuple[float, float]:
+        seen = (rgb, mask, view.rod, np.array(view.lean))
+        digest = hashlib.sha256(b"".join(part.tobytes() for part in seen)).digest()
+        with self._lock:
+            if digest not in self._looks:
+                self._looks[digest] = look(rgb, mask, view.rod, view.lean)
+            while len(self._looks) > KEPT:
+                self._looks.popitem(last=False)
+            return self._looks[digest]
+
+
+_memory = _Memory()
