@@ -108,15 +108,15 @@ and at the body beside it (`objectmorpher_core/models/rods.onnx`, 0.6 MB, Apache
 shape network reads, and were trained in seven minutes on 2,752 handles of made-up vessels
 (`objectmorpher train rods`; making those takes half an hour on two cores). Of 320 that were held
 out they are off by 5.8 degrees in the median and by 12.0 in the root mean square, of the surer half
-by 5.4 and 8.6; the azimuths spread by 30. One network alone is off by up to 12.8. Where they expect
-to be off by more than 29 degrees, the handle stays as it was.
+by 5.4 and 8.6; the azimuths spread by 29. One network alone is off by up to 12.8. Where they expect
+to be off by more than 20 degrees, the handle stays as it was.
 
 On four vessels at five azimuths each, with which the rods were made and by which the three networks
-were preferred to one (unlit, and so harder than photos: 13.7 degrees off for 18 to 21 of one), a
-turn by 20 degrees goes from 18.0 dB and an IoU of 0.883 to 19.5 and 0.917, a turn by 35 from 16.6
-and 0.844 to 17.7 and 0.880; with the true azimuth it would be 21.1 and 0.941, and 18.9 and 0.912.
-On two others at three azimuths each, on which nothing was chosen, from 18.7 and 0.904 to 19.0 and
-0.917, and from 17.1 and 0.859 to 17.1 and 0.875. The mug of the table was at 16.3 and 0.837.
+were preferred to one (they are unlit, and so harder than photos: 8.9 degrees off), a turn by 20
+degrees goes from 18.0 dB and an IoU of 0.883 to 20.2 and 0.927, a turn by 35 from 16.6 and 0.844 to
+18.2 and 0.892; with the true azimuth it would be 21.1 and 0.941, and 18.9 and 0.912. On two others
+at three azimuths each, on which nothing was chosen, from 18.7 and 0.904 to 20.1 and 0.934, and from
+17.1 and 0.859 to 18.2 and 0.900. The mug of the table was at 16.3 and 0.837.
 
 A box is fitted to what the network sees on a coarse grid, and then once more to its outline, whose
 six corners say nearly all of it. What the network sees at such a box's corners counts less then,

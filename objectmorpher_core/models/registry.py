@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, TypeVar
 
-# The program's own weights, which come with it (docs/shape_network, docs/lifting, docs/compositing).
+# The weights that come with the program (docs/shape_network, docs/lifting, docs/compositing).
 
 PACKAGE = "objectmorpher_core.models"
 SHAPE, RODS, SHADOW = "shape.onnx", "rods.onnx", "shadow.onnx"
