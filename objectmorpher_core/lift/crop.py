@@ -40,7 +40,7 @@ class Crop(NamedTuple):
     @staticmethod
     def at(left: float, top: float, side: float, camera: Camera) -> Crop:
         """The nearest whole pixels of a square of photo px."""
-        x, y, wide = (round(float(n)) for n in (left, top, side))
+        x, y, wide = round(left), round(top), max(round(side), 1)
         middle = (np.array([x, y]) + 0.5 * wide - [camera.cx, camera.cy]) / camera.focal
         return Crop(x, y, wide, np.array([*middle, wide / camera.focal], np.float32))
 
@@ -64,7 +64,8 @@ class Crop(NamedTuple):
     def _cut(self, image: np.ndarray) -> np.ndarray:
         height, width = image.shape[:2]
         x0, y0 = max(self.left, 0), max(self.top, 0)
-        x1, y1 = min(self.left + self.side, width), min(self.top + self.side, height)
+        x1 = max(min(self.left + self.side, width), x0)  # it may lie beside the photo
+        y1 = max(min(self.top + self.side, height), y0)
         whole = np.zeros((self.side, self.side, *image.shape[2:]), image.dtype)
         whole[y0 - self.top : y1 - self.top, x0 - self.left : x1 - self.left] = image[y0:y1, x0:x1]
         return whole

@@ -40,9 +40,10 @@ def azimuth_of(pixels: Pixels, mask: Mask, view: RodView) -> float | None:
 
     None where the network cannot run, or is not sure.
     """
-    if models.path(registry.TOKENS) is None:
+    seen = view.crop.seen_mask(mask)
+    if models.path(registry.TOKENS) is None or not view.rod.any() or not (seen & ~view.rod).any():
         return None
-    azimuth, error = _memory.look(view.crop.seen(pixels), view.crop.seen_mask(mask), view)
+    azimuth, error = _memory.look(view.crop.seen(pixels), seen, view)
     return azimuth if error < SURE else None
 
 
@@ -53,10 +54,11 @@ def look(rgb: RGB, mask: Mask, rod: Mask, lean: float) -> tuple[float, float]:
     in a mirror: the networks know those on the right.
     """
     is_left = np.nonzero(rod)[1].mean() < np.nonzero(mask & ~rod)[1].mean()
-    seen, own, out = (part[:, ::-1] if is_left else part for part in (rgb, mask, rod))
-    tokens = dino_tokens.shared().inner_tokens(np.ascontiguousarray(seen)).transpose(2, 0, 1)
+    if is_left:
+        rgb, mask, rod = rgb[:, ::-1], mask[:, ::-1], rod[:, ::-1]
+    tokens = dino_tokens.shared().inner_tokens(np.ascontiguousarray(rgb)).transpose(2, 0, 1)
     wanted = {
-        "tokens": np.ascontiguousarray(tokens)[None], "planes": planes_of(own, out)[None],
+        "tokens": np.ascontiguousarray(tokens)[None], "planes": planes_of(mask, rod)[None],
         "lean": np.array([lean / UNIT], np.float32),
     }  # fmt: skip
     azimuth, doubt = (float(value[0]) for value in _session().run(None, wanted))

@@ -28,7 +28,7 @@ SLIVER, BESIDE = 0.015, 1.5  # x extent, and x that: how much of what is beside 
 UPRIGHT = 0.9  # cosine between the axis and the picture's upright, as those learned from stand
 MOST_OBLIQUE = 0.05  # cosine between a ray and a rod's plane, from which its depth is read
 BEFORE = 0.2  # x extent, over which a rod is looked for before the body
-AROUND, INNER, MARGIN = 1.3, 0.8, 0.06  # x its height, and x the crop: see `_crop`
+AROUND, INNER, MARGIN = 1.3, 0.8, 0.06  # x its height, and x the crop: see `_view`
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class TurnedBody:
     def with_rods(self, azimuth_of: AzimuthOf) -> ReliefBody:
         """Return the body whose rods lie in planes through the axis, where that is known."""
         found, way = self, self.axis.way[:2]
-        if abs(way[1]) < UPRIGHT * np.linalg.norm(way):
+        if abs(way[1]) <= UPRIGHT * np.linalg.norm(way):
             return self.body
         for rod in self._rods():
             azimuth = azimuth_of(self._view(rod))
@@ -126,7 +126,8 @@ class TurnedBody:
         tangents = (outline.photo_xy(outline.cells) - [camera.cx, camera.cy]) / camera.focal
         rays = np.concatenate([tangents, np.ones((*outline.shape, 1))], -1)
         right = np.cross(axis.way, axis.front)
-        side = np.sign((rays[rod].mean(0) * axis.centre[2] - axis.centre) @ right)
+        is_right = (rays[rod].mean(0) * axis.centre[2] - axis.centre) @ right > 0
+        side = 1.0 if is_right else -1.0
         way = side * np.cos(azimuth) * right + np.sin(azimuth) * axis.front
         normal = np.cross(axis.way, way)
         normal *= np.sign((rays[rod] @ normal).mean())

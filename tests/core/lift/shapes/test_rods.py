@@ -12,7 +12,9 @@ from test_recognition import AT, TANGENTS, WIDTH, body_of, see
 
 from objectmorpher_core import models
 from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import turn_matrix
+from objectmorpher_core.lift.crop import Crop
 from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.shapes import completed, recognised, rod_look
@@ -84,6 +86,16 @@ def test_of_which_the_azimuth_is_unknown_stays_as_it_was() -> None:
     )
     assert np.array_equal(before.middle, after.middle)
     assert np.array_equal(before.front.square, after.front.square)
+
+
+@pytest.mark.parametrize("corner", [(400.0, -90.0), (-90.0, 400.0), (30.0, 40.0)])
+def test_a_crop_beside_the_photo_is_black(corner: tuple[float, float]) -> None:
+    camera, photo = Camera.from_fov(60, 80), np.full((80, 60, 3), 200, np.uint8)
+    crop = Crop.at(*corner, 50.0, camera)
+    seen, mask = crop.seen(photo), crop.seen_mask(np.ones((80, 60), bool))
+    assert mask.any() == (corner == (30.0, 40.0))
+    assert mask.any() or not seen.any()
+    assert Crop.at(*corner, 0.2, camera).side == 1
 
 
 @pytest.fixture(scope="module")
