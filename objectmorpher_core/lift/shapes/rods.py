@@ -138,9 +138,9 @@ class TurnedBody:
         # Beside the outline, too: surfaces go on there as they are about to.
         own = rod | (~outline.inside & (nearest_in(outline.inside) == nearest))
         share = self.share * own
-        sides = [side.towards(half, share) for side in (body.front, body.back)]
+        front, back = (own_side.towards(half, share) for own_side in (body.front, body.back))
         middle = body.middle + share * (plane - body.middle)
-        body = replace(body, middle=middle, front=sides[0], back=sides[1])
+        body = replace(body, middle=middle, front=front, back=back)
         ends = _swept(rod, -way[:2], outline) & outline.inside & ~own
         before = plane + half - body.middle
         own_half = body.front.half(outline.cells.reshape(-1, 2)).reshape(outline.shape)

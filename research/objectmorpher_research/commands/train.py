@@ -275,10 +275,15 @@ def _absent(*modules: str) -> str:
     return " and ".join(names)
 
 
-def _train_shadow(options: argparse.Namespace) -> None:
-    """Makes scenes, trains, and writes weights."""
+def _check_installed() -> None:
+    """Raises UsageError where a package is missing that training needs."""
     if absent := _absent(*NEEDED):
         raise UsageError(f"training needs {absent}: `pip install {absent.replace(' and ', ' ')}`")
+
+
+def _train_shadow(options: argparse.Namespace) -> None:
+    """Makes scenes, trains, and writes weights."""
+    _check_installed()
     if min(options.scenes, options.steps) < 1 or options.seed < 0:
         raise UsageError("--scenes and --steps are at least 1, --seed is not negative")
     from ..training.train_shadow import ShadowPlan, export, train
@@ -292,8 +297,7 @@ def _train_shadow(options: argparse.Namespace) -> None:
 
 def _train_rods(options: argparse.Namespace) -> None:
     """Makes handles, trains, measures, and writes weights."""
-    if absent := _absent(*NEEDED):
-        raise UsageError(f"training needs {absent}: `pip install {absent.replace(' and ', ' ')}`")
+    _check_installed()
     if min(options.samples, options.steps) < 1 or options.seed < 0:
         raise UsageError("--samples and --steps are at least 1, --seed is not negative")
     from ..training.train_rods import RodPlan, export, train
@@ -308,9 +312,7 @@ def _train_rods(options: argparse.Namespace) -> None:
 
 def _train_shape(options: argparse.Namespace) -> None:
     """Makes samples, trains, measures, and writes weights and figures."""
-    absent = [name for module, name in NEEDED.items() if find_spec(module) is None]
-    if absent:
-        raise UsageError(f"training needs {' and '.join(absent)}: `pip install {' '.join(absent)}`")
+    _check_installed()
     from ..training.shapes.families import FAMILIES
     from ..training.train_shape import TrainingPlan, figures, train, trained
 

@@ -71,21 +71,20 @@ def _try(rng: np.random.Generator) -> RodSample | None:
     if mask.sum() < LEAST or rod.sum() < SMALLEST * mask.sum():
         return None
     eye = _framed(rng, rod, body, loose)
-    ground = lowest(solid, COLUMNS) if eye.axes[2, 1] < -0.05 and rng.random() < GROUNDED else None
+    ground = NO_GROUND
+    if eye.axes[2, 1] < -0.05 and rng.random() < GROUNDED:
+        ground = lowest(solid, COLUMNS)
     rays, _ = _rays(eye, DRAWN)
     lamps, out = _lamps(rng, eye), np.zeros((DRAWN * DRAWN, 16))
-    ground = NO_GROUND if ground is None else ground
     trace(rays, eye.at, solid, lamps, ground, 0, DRAWN * DRAWN, out)
     scene = _Scene(solid, _materials(rng, built), ground)
     picture = _picture(rng, scene, eye, rays, lamps, out, DRAWN)
     picture = cv2.resize(picture, (SIDE, SIDE), interpolation=cv2.INTER_CUBIC)
     seen = _enlarged((out[:, 0] > 0).reshape(DRAWN, DRAWN))
     rod = seen & ~_enlarged(_seen(bare, eye, DRAWN))
-    foot = (np.zeros(3) - built.ball[0]) / built.ball[1]
-    middle = foot * [1, 0, 1]  # on the axis, as high as the ball's middle
-    return RodSample(
-        _developed(rng, np.maximum(picture, 0)), seen, rod, *_angles(eye, middle)
-    )  # fmt: skip
+    # On the axis, as high as the ball's middle
+    middle = -built.ball[0] / built.ball[1] * [1.0, 0.0, 1.0]
+    return RodSample(_developed(rng, np.maximum(picture, 0)), seen, rod, *_angles(eye, middle))
 
 
 def _aim(rng: np.random.Generator) -> _Eye:
