@@ -24,7 +24,17 @@ from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
-from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of, rod_look, rounded
+from ..shapes import (
+    Recognised,
+    closed_ring,
+    completed,
+    flattened,
+    laid,
+    recognised,
+    rims_of,
+    rod_look,
+    rounded,
+)
 from . import shape_look
 from .body import MIDDLE, ReliefBody, closed, leaning
 from .canvas import ReliefCanvas, bilinear
@@ -133,12 +143,15 @@ class ReliefLifter:
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
                 body = replace(body, doubt=seen.doubt)
+                # What faces the camera may be a flower; an egg that lies as a plate does looks like
+                # one, and is rarer.
                 rims = rims_of(seen, camera) if settings.kind == "auto" else []
-                # An egg that lies as a plate does looks like one, and is rarer.
-                if rims and rims[0].is_steep:  # what faces the camera may be a flower
+                is_rim = bool(rims) and rims[0].is_steep
+                shape = closed_ring(seen, rims[0]) if is_rim else recognised(seen, settings.kind)
+                if is_rim and shape is None:
                     body = laid(body, rims, seen, subject, settings.thickness)
                 else:
-                    body = _recognised(body, seen, subject, settings)
+                    body = _recognised(body, shape, subject, settings)
         if settings.kind == "tube":
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
@@ -169,11 +182,10 @@ class ReliefLifter:
 
 
 def _recognised(
-    body: ReliefBody, seen: shape_look.SeenShape, subject: LiftSubject, settings: LiftSettings
+    body: ReliefBody, shape: Recognised | None, subject: LiftSubject, settings: LiftSettings
 ) -> ReliefBody:
     """`body` as the plain shape that it looks like, else leaning as far as things do."""
     camera = subject.camera
-    shape = recognised(seen, settings.kind)
     if shape is None or _contradicts(shape, body, settings):
         body = leaning(body, camera)
         return body if body.standing.prism is not None else closed(body)

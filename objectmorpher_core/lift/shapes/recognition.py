@@ -19,8 +19,9 @@ from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
 from .boxes import fit_box, fit_flat
 from .evidence import Evidence, Misfit
+from .rims import Rim
 from .rods import Axis, AzimuthOf, TurnedBody
-from .round import fit_ellipsoid, fit_revolution, fit_ring
+from .round import fit_closed_ring, fit_ellipsoid, fit_revolution, fit_ring
 from .solids import Drawn, Mesh, RayGrid, drawn
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
@@ -46,6 +47,9 @@ RECTANGLE = 1.5  # log odds, of an outline that is one in perspective
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
 EXPLAINED = 0.95  # weight, from which no other shape is tried
 STANDS, LYING = 0.5, 0.5  # weight of a shape that shows what is up, and cosine to the upright
+# Of what a plate's rim encloses: how near its middle the far half is looked at, x the rim's radius
+# from the rim, how much of that faces as the rim does, and the description of a ring that may be.
+INMOST, PLANE, LIKELY = -0.5, 0.93, 3.0
 LEAST_SURE = 20  # cells, from which anything is recognised
 SECOND = 0.1  # x what is seen of a box, of its second side
 
@@ -129,6 +133,24 @@ class PlacedShape:
     weight: float
     is_met: Mask  # (h, w) by rays
     is_near: Mask  # (h, w) that, or nearly
+
+
+def closed_ring(seen: SeenShape, rim: Rim) -> Recognised | None:
+    """A ring of which `rim` is the outline, and whose nearer side hides its hole; None elsewhere.
+
+    A doughnut seen aslant has the outline of a plate. Of a plate the far half is seen; of a ring
+    the hole's far side is, which is steep.
+    """
+    evidence = Evidence.of(seen)
+    tangents = evidence.grid.tangents
+    is_far = evidence.sure & (rim.outside(tangents) < INMOST * rim.radius / rim.centre[2])
+    is_far &= (tangents - rim.centre[:2] / rim.centre[2]) @ rim.slope > 0
+    if not is_far.any() or float((evidence.normal[is_far] @ rim.normal).mean()) > PLANE:
+        return None
+    if (found := fit_closed_ring(evidence, rim.normal)) is None:
+        return None
+    ring = _described("round", found, evidence, 0.0)
+    return ring if ring.description < LIKELY else None
 
 
 def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:

@@ -6,6 +6,8 @@ the axis is known: see `lathe`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -23,6 +25,8 @@ from .solids import AROUND, FINE, Mesh, drawn, ellipsoid, tube
 LEAST_HOLE = 0.01  # x the filled outline's area
 CENTRAL = 0.35  # x the outline's half axis, that a hole's middle may be off
 STEPS = np.array([0.03, 0.03, 0.1, 0.1, 0.05, 0.1, 0.2])  # of the numbers of a ring
+TUBES = (0.2, 0.35, 0.5, 0.7)  # x a ring's radius, half of a tube's that are tried
+FARTHEST = 250.0  # misfit, from which an outline is no ring's
 HALF_MOMENT = 2.0  # standard deviations that an ellipse's half axis is
 
 
@@ -31,36 +35,66 @@ def fit_ring(evidence: Evidence) -> tuple[Mesh, Misfit] | None:
     found = _ellipses(evidence)
     if found is None:
         return None
-    (middle, way, half), hole = found
+    outer, hole = found
+    half = outer[2]
     radius, thick = 0.5 * (half[0] + hole[0]), 0.5 * (half[0] - hole[0])
-    lean = float(np.arcsin(np.clip(0.5 * (half[1] + hole[1]) / radius, 0.1, 0.99)))
-    depth = float(np.median(evidence.depth[evidence.sure]))
+    sine = 0.5 * (half[1] + hole[1]) / radius
+    starts = [_RingStart(evidence, outer, radius, thick, sine, sign) for sign in (1.0, -1.0)]
+    return min((start.fit() for start in starts), key=lambda fit: fit[1].total)
 
-    def builder(sign: float):
-        def build(numbers: F64, around: int = AROUND) -> Mesh:
-            x, y, turn, more, wide, width, height = numbers
-            centre = np.append(middle + radius * np.array([x, y]), 1.0)
-            cosine, sine = np.cos(turn), np.sin(turn)
-            along = np.array([[cosine, -sine], [sine, cosine]]) @ [-way[1], way[0]]
-            forward = centre / np.linalg.norm(centre)
-            flat = np.append(along, 0.0) - forward * (forward[:2] @ along)
-            flat /= np.linalg.norm(flat)
-            own = sign * (lean + more)
-            axis = np.cos(own) * flat + np.sin(own) * forward
-            sizes = depth * np.array([radius * np.exp(wide), thick * np.exp(width), 0.0])
-            sizes[2] = sizes[1] * np.exp(height)
-            return tube(depth * centre, axis, sizes, around)
 
-        return build
+def fit_closed_ring(evidence: Evidence, normal: F64) -> tuple[Mesh, Misfit] | None:
+    """The best ring whose nearer side hides its hole; None where its outline is none's.
 
-    fits = []
-    for sign in (1.0, -1.0):
-        build = builder(sign)
-        best = np.zeros(7)
+    `normal` (3,) roughly its axis, which an outline alone leaves two ways.
+    """
+    outer = _ellipse(_filled(evidence.fine) > 0, evidence)
+    trials = []
+    for share in TUBES:
+        radius = outer[2][0] / (1 + share)
+        sine = outer[2][1] / radius - share
+        sides = [
+            _RingStart(evidence, outer, radius, share * radius, sine, sign) for sign in (1.0, -1.0)
+        ]
+        start = max(sides, key=lambda side: abs(float(side.mesh().axes[0] @ normal)))
+        trials.append((evidence.misfit(start.mesh()).total, start))
+    cost, start = min(trials, key=lambda trial: trial[0])
+    return start.fit() if cost < FARTHEST else None
+
+
+@dataclass(frozen=True, eq=False)
+class _RingStart:
+    """A first guess at a ring, in tangents, from which it is fitted."""
+
+    evidence: Evidence
+    outer: Ellipse
+    radius: float
+    thick: float  # half of the tube's
+    sine: float  # of the angle between the ring's plane and the rays
+    sign: float  # to which of the two sides it leans
+
+    def mesh(self, numbers: F64 = np.zeros(len(STEPS)), around: int = AROUND) -> Mesh:  # noqa: B008
+        """The ring that is off from it by `numbers`, as many as STEPS."""
+        x, y, turn, more, wide, width, height = numbers
+        middle, way, _ = self.outer
+        depth = float(np.median(self.evidence.depth[self.evidence.sure]))
+        centre = np.append(middle + self.radius * np.array([x, y]), 1.0)
+        cosine, sine = np.cos(turn), np.sin(turn)
+        along = np.array([[cosine, -sine], [sine, cosine]]) @ [-way[1], way[0]]
+        forward = centre / np.linalg.norm(centre)
+        flat = np.append(along, 0.0) - forward * (forward[:2] @ along)
+        flat /= np.linalg.norm(flat)
+        own = self.sign * (float(np.arcsin(np.clip(self.sine, 0.1, 0.99))) + more)
+        axis = np.cos(own) * flat + np.sin(own) * forward
+        sizes = depth * np.array([self.radius * np.exp(wide), self.thick * np.exp(width), 0.0])
+        sizes[2] = sizes[1] * np.exp(height)
+        return tube(depth * centre, axis, sizes, around)
+
+    def fit(self) -> tuple[Mesh, Misfit]:
+        best = np.zeros(len(STEPS))
         for _ in range(2):  # seven numbers take longer than the others' do
-            best = least(lambda own, b=build: evidence.misfit(b(own)).total, best, STEPS)
-        fits.append((build(best, FINE), evidence.misfit(build(best))))
-    return min(fits, key=lambda fit: fit[1].total)
+            best = least(lambda own: self.evidence.misfit(self.mesh(own)).total, best, STEPS)
+        return self.mesh(best, FINE), self.evidence.misfit(self.mesh(best))
 
 
 Ellipse = tuple[F64, F64, F64]  # middle (2,) tangents, unit long axis (2,), half axes (2,)
@@ -68,29 +102,35 @@ Ellipse = tuple[F64, F64, F64]  # middle (2,) tangents, unit long axis (2,), hal
 
 def _ellipses(evidence: Evidence) -> tuple[Ellipse, F64] | None:
     """Of the filled outline, and the half axes (2,) of its hole likewise; None without a hole."""
-    fine = evidence.fine.astype(np.uint8)
-    rings, _ = cv2.findContours(fine, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    filled = cv2.drawContours(np.zeros_like(fine), rings, -1, 1, cv2.FILLED)
-    _, pieces, stats, _ = cv2.connectedComponentsWithStats(filled - fine, connectivity=4)
+    filled = _filled(evidence.fine)
+    _, pieces, stats, _ = cv2.connectedComponentsWithStats(filled - evidence.fine, connectivity=4)
     areas = np.asarray(stats)[1:, cv2.CC_STAT_AREA]
     if not len(areas) or areas.max() < LEAST_HOLE * filled.sum():
         return None
     outer, inner = (
-        _ellipse(np.argwhere(part)[:, ::-1].astype(np.float64))
+        _ellipse(part, evidence)
         for part in (filled > 0, np.asarray(pieces) == 1 + int(np.argmax(areas)))
     )
     if np.linalg.norm(outer[0] - inner[0]) > CENTRAL * outer[2][1]:
         return None
-    step = evidence.grid.step / STRIDE
-    middle = np.array(evidence.grid.start) + step * (outer[0] - STRIDE // 2)
-    return (middle, outer[1], step * outer[2]), step * inner[2]
+    return outer, inner[2]
 
 
-def _ellipse(cells: F64) -> Ellipse:
-    """The ellipse with the moments of cells (n, 2)."""
+def _filled(fine: Mask) -> np.ndarray:
+    """(s, s) u8 a mask (s, s) without its holes."""
+    own = fine.astype(np.uint8)
+    rings, _ = cv2.findContours(own, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(cv2.drawContours(np.zeros_like(own), rings, -1, 1, cv2.FILLED))
+
+
+def _ellipse(part: Mask, evidence: Evidence) -> Ellipse:
+    """The ellipse with the moments of a part (s, s) of the crop."""
+    cells = np.argwhere(part)[:, ::-1].astype(np.float64)
     values, axes = np.linalg.eigh(np.cov((cells - cells.mean(0)).T))
     half = HALF_MOMENT * np.sqrt(np.maximum(values[::-1], 1e-9))
-    return cells.mean(0), axes[:, 1], half
+    step = evidence.grid.step / STRIDE
+    middle = np.array(evidence.grid.start) + step * (cells.mean(0) - STRIDE // 2)
+    return middle, axes[:, 1], step * half
 
 
 LEANS = np.radians([4.0, 15.0, 28.0, 42.0, 58.0, 74.0])  # of the axis from the picture's plane

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 SHARD = 32  # samples in a file
+# Tokens of the mirrored crops: those of the crops, left and right exchanged, are others.
+MIRRORED = "mirrored_tokens"
 NORMAL_STEPS = 127.0  # a normal's coordinate is kept in a byte
 
 
@@ -63,7 +65,8 @@ def _write(job: tuple[Path, int]) -> None:
     file, seed = job
     samples = [make_sample(k) for k in range(seed, seed + SHARD)]
     arrays = packed(samples)
-    arrays["tokens"] = _tokens(np.stack([s.rgb for s in samples]))
+    rgb = np.stack([s.rgb for s in samples])
+    arrays["tokens"], arrays[MIRRORED] = _tokens(rgb), _tokens(rgb[:, :, ::-1])
     partial = file.with_suffix(".part")
     with partial.open("wb") as out:
         np.savez(out, allow_pickle=False, **arrays)
@@ -93,7 +96,7 @@ def _tokens(rgb: np.ndarray) -> np.ndarray:
 
     if not _ENCODER:
         _ENCODER.append(TokenNet(threads=1))
-    found = np.stack([_ENCODER[0].inner_tokens(one) for one in rgb])
+    found = np.stack([_ENCODER[0].inner_tokens(np.ascontiguousarray(one)) for one in rgb])
     return np.ascontiguousarray(found.transpose(0, 3, 1, 2), np.float16)
 
 
@@ -116,12 +119,12 @@ def batches(
 
 
 def _mirrored(arrays: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
-    """Packed samples, left and right exchanged in some (n,): a token goes with its place."""
-    found = {name: array.copy() for name, array in arrays.items()}
-    for name, array in arrays.items():
-        if array.ndim > 2:
-            axis = 3 if name == "tokens" else 2
-            found[name][which] = np.flip(array[which], axis)
+    """Packed samples, left and right exchanged in some (n,)."""
+    found = {name: array.copy() for name, array in arrays.items() if name != MIRRORED}
+    for name, array in found.items():
+        if array.ndim > 2 and name != "tokens":
+            array[which] = np.flip(array[which], 2)
+    found["tokens"][which] = arrays[MIRRORED][which]
     found["normal"][which, ..., 0] *= -1
     found["tangents"][which, 0] *= -1
     return found
