@@ -59,7 +59,8 @@ def fit_closed_ring(evidence: Evidence, normal: F64) -> tuple[Mesh, Misfit] | No
         start = max(sides, key=lambda side: abs(float(side.mesh().axes[0] @ normal)))
         trials.append((evidence.misfit(start.mesh()).total, start))
     cost, start = min(trials, key=lambda trial: trial[0])
-    return start.fit() if cost < FARTHEST else None
+    # It starts farther off than one whose hole is seen.
+    return start.fit(4, HOPELESS) if cost < FARTHEST else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +91,18 @@ class _RingStart:
         sizes[2] = sizes[1] * np.exp(height)
         return tube(depth * centre, axis, sizes, around)
 
-    def fit(self) -> tuple[Mesh, Misfit]:
+    def fit(self, rounds: int = 2, hopeless: float = np.inf) -> tuple[Mesh, Misfit]:
+        """The best ring near it; a misfit that stays `hopeless` is not made smaller."""
+
+        def misfit(own: F64) -> Misfit:
+            return self.evidence.misfit(self.mesh(own))
+
         best = np.zeros(len(STEPS))
-        for _ in range(2):  # seven numbers take longer than the others' do
-            best = least(lambda own: self.evidence.misfit(self.mesh(own)).total, best, STEPS)
-        return self.mesh(best, FINE), self.evidence.misfit(self.mesh(best))
+        for _ in range(rounds):  # seven numbers take longer than the others' do
+            best = least(lambda own: misfit(own).total, best, STEPS)
+            if misfit(best).total > hopeless:
+                break
+        return self.mesh(best, FINE), misfit(best)
 
 
 Ellipse = tuple[F64, F64, F64]  # middle (2,) tangents, unit long axis (2,), half axes (2,)

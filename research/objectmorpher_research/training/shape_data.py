@@ -105,11 +105,13 @@ def batches(
 ) -> Iterator[Batch]:
     """The samples of the files, mixed within some files at a time, half of them mirrored.
 
-    `held_out`: families that are left out.
+    `held_out`: families that are left out. Raises ValueError for samples of an earlier version.
     """
     order = rng.permutation(len(files))
     for begin in range(0, len(order), 8):
         chosen = [dict(np.load(files[k])) for k in order[begin : begin + 8]]
+        if any(MIRRORED not in c for c in chosen):
+            raise ValueError("these samples were made by an earlier version: take another folder")
         joined = {name: np.concatenate([c[name] for c in chosen]) for name in chosen[0]}
         mixed = rng.permutation(np.flatnonzero(~np.isin(joined["family"], held_out)))
         for start in range(0, len(mixed) - size + 1, size):

@@ -33,7 +33,8 @@ def arrays():
     """Packed samples with made-up tokens: no weights are needed here."""
     found = packed([make_sample(seed, families=("boxes",)) for seed in range(COUNT)])
     rng = np.random.default_rng(0)
-    found["tokens"] = rng.normal(size=(COUNT, WIDTH, GRID, GRID)).astype(np.float16)
+    for name in ("tokens", shape_data.MIRRORED):
+        found[name] = rng.normal(size=(COUNT, WIDTH, GRID, GRID)).astype(np.float16)
     return found
 
 
@@ -75,6 +76,27 @@ def test_a_worn_mask_is_at_most_a_little_off(arrays):
         for _ in range(5):
             worn = shape_data._worn(mask, rng)
             assert (worn ^ mask).sum() < 0.3 * mask.sum()
+
+
+def test_a_mirrored_sample_has_the_tokens_of_the_mirrored_crop(arrays):
+    which = np.array([True, False] * (COUNT // 2))
+    found = shape_data._mirrored(arrays, which)
+    for k, is_mirrored in enumerate(which):
+        own = shape_data.MIRRORED if is_mirrored else "tokens"
+        assert np.array_equal(found["tokens"][k], arrays[own][k])
+        step = -1 if is_mirrored else 1
+        for name in ("rgb", "mask", "front", "edge"):
+            assert np.array_equal(found[name][k], arrays[name][k][:, ::step]), name
+        sideways = (found[name][k, ..., 0] for name in ("normal", "tangents"))
+        assert np.array_equal(next(sideways), step * arrays["normal"][k][:, ::step, 0])
+        assert np.array_equal(next(sideways), step * arrays["tangents"][k][0])
+
+
+def test_samples_of_an_earlier_version_are_refused(arrays, tmp_path):
+    earlier = {name: array for name, array in arrays.items() if name != shape_data.MIRRORED}
+    np.savez(tmp_path / "00000000.npz", **earlier)
+    with pytest.raises(ValueError, match="another folder"):
+        next(shape_data.batches([tmp_path / "00000000.npz"], 1, np.random.default_rng(0)))
 
 
 def test_stopped_and_resumed_it_is_where_it_was(arrays, tmp_path):

@@ -6,15 +6,16 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import pytest
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.spreading import spread
-from objectmorpher_core.lift.shapes import laid, rims_of
+from objectmorpher_core.lift.shapes import closed_ring, completed, laid, rims_of
 from objectmorpher_core.lift.shapes.rims import Rim, at_edge
-from objectmorpher_core.lift.shapes.solids import Mesh, RayGrid, drawn, ellipsoid, revolved
+from objectmorpher_core.lift.shapes.solids import Mesh, RayGrid, drawn, ellipsoid, revolved, tube
 from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_research.training.shape_eval import score, surfaces_of
 from tests.core.lift.shapes.test_recognition import AT, as_far, body_of, see
@@ -154,3 +155,26 @@ def test_an_egg_has_no_rim() -> None:
     axes = turn_matrix(0, 0, 20) * np.array([0.34, 0.2, 0.2])
     rims, _, _, _ = _laid(ellipsoid(AT, axes))
     assert rims == []
+
+
+@pytest.mark.parametrize("lean", [25.0, 35.0, 42.0])
+def test_a_ring_that_hides_its_hole_is_no_plate(lean: float) -> None:
+    axis, sizes = -turn_matrix(25, lean, 6)[:, 1], np.array([0.22, 0.14, 0.14])
+    seen, true = see(tube(AT, axis, sizes, 96))
+    body, camera = body_of(seen)
+    rims = rims_of(seen, camera)
+    assert rims, "its outline is nearly a plate's"
+    found = closed_ring(seen, rims[0])
+    assert found is not None and found.mesh is not None
+    assert abs(found.mesh.axes[0] @ axis) > np.cos(np.radians(6.0))
+    whole = completed(fused(body, seen, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
+    error = score(as_far(surfaces_of(whole, seen.mask), true, seen.mask, camera), true, seen.mask)
+    assert error.front < 0.05
+    assert error.thickness < 0.12
+
+
+def test_plates_and_cups_are_no_rings() -> None:
+    for mesh in (_saucer(), _cup(), _both()):
+        seen, _ = see(mesh)
+        rims = rims_of(seen, body_of(seen)[1])
+        assert all(closed_ring(seen, rim) is None for rim in [*rims, Rim(AT, UP, 0.34)])
