@@ -49,8 +49,8 @@ EXPLAINED = 0.95  # weight, from which no other shape is tried
 STANDS, LYING = 0.5, 0.5  # weight of a shape that shows what is up, and cosine to the upright
 # Of what a plate's rim encloses: how near its middle the far half is looked at, x the rim's radius
 # from the rim, how much of that faces as the rim does, and the description and the misfit of the
-# normals of a ring that may be. Of 103 rings and 119 plates, bowls and cups 48 and 97 have such a
-# rim; 41 of the former are found, and none of the latter.
+# normals of a ring that may be. Of 48 made rings with such a rim 38 are found, and of 80 plates,
+# bowls and cups none is taken for one.
 INMOST, PLANE, LIKELY, FACED = -0.5, 0.93, 2.9, 1.12
 LEAST_SURE = 20  # cells, from which anything is recognised
 SECOND = 0.1  # x what is seen of a box, of its second side

@@ -25,6 +25,7 @@ from .solids import AROUND, FINE, Mesh, drawn, ellipsoid, tube
 LEAST_HOLE = 0.01  # x the filled outline's area
 CENTRAL = 0.35  # x the outline's half axis, that a hole's middle may be off
 STEPS = np.array([0.03, 0.03, 0.1, 0.1, 0.05, 0.1, 0.2])  # of the numbers of a ring
+NOTHING = np.zeros(len(STEPS))  # that it is off
 TUBES = (0.2, 0.35, 0.5, 0.7)  # x a ring's radius, half of a tube's that are tried
 FARTHEST = 250.0  # misfit, from which an outline is no ring's
 HALF_MOMENT = 2.0  # standard deviations that an ellipse's half axis is
@@ -74,7 +75,7 @@ class _RingStart:
     sine: float  # of the angle between the ring's plane and the rays
     sign: float  # to which of the two sides it leans
 
-    def mesh(self, numbers: F64 = np.zeros(len(STEPS)), around: int = AROUND) -> Mesh:  # noqa: B008
+    def mesh(self, numbers: F64 = NOTHING, around: int = AROUND) -> Mesh:
         """The ring that is off from it by `numbers`, as many as STEPS."""
         x, y, turn, more, wide, width, height = numbers
         middle, way, _ = self.outer
@@ -97,7 +98,7 @@ class _RingStart:
         def misfit(own: F64) -> Misfit:
             return self.evidence.misfit(self.mesh(own))
 
-        best = np.zeros(len(STEPS))
+        best = NOTHING
         for _ in range(rounds):  # seven numbers take longer than the others' do
             best = least(lambda own: misfit(own).total, best, STEPS)
             if misfit(best).total > hopeless:
