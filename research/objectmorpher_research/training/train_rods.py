@@ -30,7 +30,6 @@ SHARD = 32  # handles in a file
 HELD_OUT = 0.1  # of the files
 RATE, DECAY, STEEPEST = 3e-3, 0.05, 2.0
 LEAN_OFF = 0.05  # radians, deviation: a fitted axis leans otherwise than the true one
-DROPPED = 3  # of the 10 binary digits of a weight's fraction
 INPUTS, OUTPUTS = ("tokens", "planes", "lean"), ("azimuth", "doubt")
 SURE = (0.5, 1.0)  # shares of those that are held out, the surest first
 
@@ -161,6 +160,6 @@ def figures(net: torch.nn.Module, data: RodData) -> dict[str, float]:
 
 
 def export(net: torch.nn.Module, path: Path) -> str:
-    """Write `path`, an ONNX file of half-precision weights; its SHA-256."""
+    """Write `path`, an ONNX file; its SHA-256."""
     inputs = (torch.zeros(1, WIDTH, GRID, GRID), torch.zeros(1, 2, GRID, GRID), torch.zeros(1))
-    return write_onnx(net, inputs, path, INPUTS, OUTPUTS, DROPPED)
+    return write_onnx(net, inputs, path, INPUTS, OUTPUTS)

@@ -34,7 +34,6 @@ from .shadows.scenes import SceneGeometry, make_geometry, packed, unpacked
 from .shadows.solids import silhouettes
 from .train_shape import follow, schedule
 
-DROPPED = 3  # of the 10 binary digits of a weight's fraction: an archive is smaller by a sixth
 SHARD = 64  # scenes in a file, and samples that are handed over at once
 BOARDS, BOARDS_SEED = 160, 5
 OPEN, OTHER_FILE = 8, 0.25  # files of scenes that are at hand; how often one of them is replaced
@@ -274,6 +273,6 @@ def _take(ring: SampleRing, ready: Queue) -> None:
 
 
 def export(net: ShadowNet, path: Path) -> str:
-    """Write `path`, an ONNX file of half-precision weights; its SHA-256."""
+    """Write `path`, an ONNX file; its SHA-256."""
     inputs = (torch.zeros(1, PLANES, SIDE, SIDE),)
-    return write_onnx(net, inputs, path, (INPUT,), OUTPUTS, DROPPED)
+    return write_onnx(net, inputs, path, (INPUT,), OUTPUTS)

@@ -125,7 +125,7 @@ def test_it_runs_without_torch(arrays, tmp_path):
     torch.manual_seed(0)
     net, path = ShapeNet().eval(), tmp_path / "shape.onnx"
     export(net, path)
-    assert path.stat().st_size < 12e6
+    assert path.stat().st_size < 6e6
     batch = batch_of(arrays)
     session = open_session(path)
     inputs = {"planes": batch.planes[:1].numpy(), "tokens": batch.tokens[:1].numpy()}
@@ -138,7 +138,7 @@ def test_it_runs_without_torch(arrays, tmp_path):
 
 def test_training_goes_on_from_exported_weights(tmp_path):
     pytest.importorskip("onnx")
-    from objectmorpher_research.training.export_shape import DROPPED, export, weights_of
+    from objectmorpher_research.training.export_shape import MOST, export, weights_of
 
     torch.manual_seed(0)
     net, path = ShapeNet().train(), tmp_path / "shape.onnx"
@@ -149,8 +149,15 @@ def test_training_goes_on_from_exported_weights(tmp_path):
     export(net, path)
     again = weights_of(path, ShapeNet())
     for name, value in net.state_dict().items():
-        if value.is_floating_point():
-            assert torch.allclose(again[name], value, rtol=2.0 ** (DROPPED - 11), atol=1e-3), name
+        if not value.is_floating_point():
+            continue
+        off = (again[name] - value).abs()
+        if value.ndim < 2:
+            assert torch.equal(again[name], value), name
+            continue
+        largest = value.abs().flatten(1).amax(1)
+        spread = off.flatten(1).square().mean(1).sqrt()
+        assert (spread <= 1.3 * largest / MOST / 12**0.5).all(), name
     state = train_shape._State.resumed(tmp_path, train_shape.TrainingPlan(), again)
     assert torch.equal(state.net.state_dict()["tokens.weight"], again["tokens.weight"])
     with pytest.raises(ValueError, match="all families"):
