@@ -50,7 +50,7 @@ where DINOv2's weights are not there).
   and looks at each object twice, once mirrored: the mean of both is used.
 - **Training**: `objectmorpher train shape --folder F --samples {samples} --passes {passes:g}`:
   {steps} steps of {batch} samples; half an hour for the samples and an hour and a quarter for the
-  training on two cores, without a GPU (three and a half hours on cores without bfloat16; a GPU is
+  training on two cores, without a GPU (three and a half hours on cores without AMX; a GPU is
   used where PyTorch finds one). Called again it goes on where it was stopped; `--start` goes
   on from weights that ship. The same plan draws the same samples.
 

@@ -151,7 +151,7 @@ class ReliefLifter:
                 if is_rim and shape is None:
                     body = laid(body, rims, seen, subject, settings.thickness)
                 else:
-                    body = _recognised(body, shape, subject, settings)
+                    body = _shaped(body, shape, subject, settings)
         if settings.kind == "tube":
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
@@ -181,7 +181,7 @@ class ReliefLifter:
         return follow(body, seen, subject.camera.focal, settings.thickness, cells)
 
 
-def _recognised(
+def _shaped(
     body: ReliefBody, shape: Recognised | None, subject: LiftSubject, settings: LiftSettings
 ) -> ReliefBody:
     """`body` as the plain shape that it looks like, else leaning as far as things do."""

@@ -7,6 +7,7 @@ the axis is known: see `lathe`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -72,25 +73,34 @@ class _RingStart:
     outer: Ellipse
     radius: float
     thick: float  # half of the tube's
-    sine: float  # of the angle between the ring's plane and the rays
+    sine: float  # of its lean
     sign: float  # to which of the two sides it leans
+
+    @cached_property
+    def lean(self) -> float:
+        """Radians between the ring's plane and the rays."""
+        return float(np.arcsin(np.clip(self.sine, 0.1, 0.99)))
+
+    @cached_property
+    def depth(self) -> float:
+        """Crop units from the camera, of its middle."""
+        return float(np.median(self.evidence.depth[self.evidence.sure]))
 
     def mesh(self, numbers: F64 = NOTHING, around: int = AROUND) -> Mesh:
         """The ring that is off from it by `numbers`, as many as STEPS."""
         x, y, turn, more, wide, width, height = numbers
         middle, way, _ = self.outer
-        depth = float(np.median(self.evidence.depth[self.evidence.sure]))
         centre = np.append(middle + self.radius * np.array([x, y]), 1.0)
         cosine, sine = np.cos(turn), np.sin(turn)
         along = np.array([[cosine, -sine], [sine, cosine]]) @ [-way[1], way[0]]
         forward = centre / np.linalg.norm(centre)
         flat = np.append(along, 0.0) - forward * (forward[:2] @ along)
         flat /= np.linalg.norm(flat)
-        own = self.sign * (float(np.arcsin(np.clip(self.sine, 0.1, 0.99))) + more)
+        own = self.sign * (self.lean + more)
         axis = np.cos(own) * flat + np.sin(own) * forward
-        sizes = depth * np.array([self.radius * np.exp(wide), self.thick * np.exp(width), 0.0])
+        sizes = self.depth * np.array([self.radius * np.exp(wide), self.thick * np.exp(width), 0.0])
         sizes[2] = sizes[1] * np.exp(height)
-        return tube(depth * centre, axis, sizes, around)
+        return tube(self.depth * centre, axis, sizes, around)
 
     def fit(self, rounds: int = 2, hopeless: float = np.inf) -> tuple[Mesh, Misfit]:
         """The best ring near it; a misfit that stays `hopeless` is not made smaller."""

@@ -16,7 +16,8 @@ from .shape_net import GRID, PLANES, WIDTH, ShapeNet
 
 OPSET = 17
 INPUTS, OUTPUT = ("planes", "tokens"), "shape"
-# Ends of the names of a weight's whole numbers and of what one of them is worth in each channel.
+# Ends of the names of a weight's whole numbers, of what one of them is worth in each channel, and
+# of the same numbers where they are read.
 WHOLE, STEP, WIDE = ".whole", ".step", ".wide"
 MOST = 127  # the largest of them
 CLIPPED = np.linspace(0.6, 1.0, 9)  # x a channel's largest weight, from which it may be cut off

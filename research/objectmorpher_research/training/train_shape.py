@@ -128,7 +128,8 @@ def _device() -> torch.device:
 def _quick_numbers(device: torch.device) -> AbstractContextManager[Any]:
     """Bfloat16 where the processor multiplies matrices of it (AMX).
 
-    With AVX-512's alone a step takes a fifth longer than in float32, without either 15 times.
+    Where it only has AVX-512's instructions for bfloat16 a step takes a fifth longer than in
+    float32, and where it has neither 15 times as long.
     """
     is_quick = device.type == "cuda" or torch.cpu._is_amx_tile_supported()
     return torch.autocast(device.type, dtype=torch.bfloat16) if is_quick else nullcontext()
