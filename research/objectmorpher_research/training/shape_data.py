@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -44,15 +45,23 @@ class Batch:
     away: Tensor  # (n, 1, 1, 1) crop units to the mean of the object
 
 
-def write_shards(folder: Path, first: int, count: int, progress: Progress = silent) -> None:
-    """Files of samples with the seeds first.., those that are not there yet, in all cores."""
+def write_shards(
+    folder: Path, first: int, count: int, progress: Progress = silent,
+    families: tuple[str, ...] | None = None,
+) -> None:  # fmt: skip
+    """Files of samples with the seeds first.., those that are not there yet, in all cores.
+
+    `families`: the only ones drawn.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     wanted = [
-        (folder / f"{seed:08d}.npz", seed)
+        (folder / f"{seed:08d}.npz", range(seed, seed + SHARD), families)
         for seed in range(first, first + count, SHARD)
         if not (folder / f"{seed:08d}.npz").exists()
     ]
-    with ProcessPoolExecutor(os.cpu_count(), initializer=_begin) as pool:
+    # Processes of their own: forked from one whose networks have threads, some never end.
+    apart = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(os.cpu_count(), apart, _begin) as pool:
         for number, _ in enumerate(pool.map(_write, wanted), 1):
             progress(number / len(wanted), f"{number * SHARD} of {len(wanted) * SHARD} samples")
 
@@ -61,9 +70,9 @@ def _begin() -> None:
     cv2.setNumThreads(1)
 
 
-def _write(job: tuple[Path, int]) -> None:
-    file, seed = job
-    samples = [make_sample(k) for k in range(seed, seed + SHARD)]
+def _write(job: tuple[Path, range, tuple[str, ...] | None]) -> None:
+    file, seeds, families = job
+    samples = [make_sample(seed, families=families) for seed in seeds]
     arrays = packed(samples)
     rgb = np.stack([s.rgb for s in samples])
     arrays["tokens"], arrays[MIRRORED] = _tokens(rgb), _tokens(rgb[:, :, ::-1])

@@ -40,6 +40,15 @@ SAVED = 120.0  # s between two checkpoints
 
 
 @dataclass(frozen=True)
+class SampleSet:
+    """Samples that are drawn beside those of a plan."""
+
+    seed: int
+    samples: int
+    families: tuple[str, ...] = ()  # the only ones that are drawn; none: all
+
+
+@dataclass(frozen=True)
 class TrainingPlan:
     """A plan of training; the same plan gives the same weights, but for rounding."""
 
@@ -50,16 +59,21 @@ class TrainingPlan:
     decay: float = 0.02
     held_out: tuple[str, ...] = ()  # families that are not trained on
     seed: int = 0  # another one has other samples
+    also: tuple[SampleSet, ...] = ()
     start: str = ""  # SHA-256 of the weights that it goes on from; none: from nothing
 
     @property
     def steps(self) -> int:
-        return max(1, int(self.passes * self.samples / self.size))
+        return max(1, int(self.passes * self.total / self.size))
 
     @property
-    def first(self) -> int:
-        """Seed of the first sample."""
-        return self.seed * APART
+    def total(self) -> int:
+        """How many samples there are in all sets."""
+        return sum(own.samples for own in self.sets)
+
+    @property
+    def sets(self) -> tuple[SampleSet, ...]:
+        return (SampleSet(self.seed, self.samples), *self.also)
 
     @property
     def file(self) -> str:
@@ -78,13 +92,19 @@ def train(
 
     It goes on from `weights`, exported before, where they are given.
 
-    Raises ValueError for fewer samples than a step takes, for a seed whose samples others have, and
-    for weights of another network or of families that are held out.
+    Raises ValueError for fewer samples than a step takes, for a seed whose samples others have, for
+    two sets of one seed, and for weights of another network or of families that are held out.
     """
     if plan.samples < plan.size:
         raise ValueError(f"{plan.samples} samples are fewer than the {plan.size} of one step")
-    if not 0 <= plan.seed < UNSEEN // APART or plan.samples > APART:
-        raise ValueError(f"a seed is from 0 to {UNSEEN // APART - 1}, with {APART} samples at most")
+    seeds = [own.seed for own in plan.sets]
+    if len(set(seeds)) < len(seeds):
+        raise ValueError("two sets of samples cannot have one seed")
+    for own in plan.sets:
+        if not 0 <= own.seed < UNSEEN // APART or not 0 < own.samples <= APART:
+            raise ValueError(
+                f"a seed is from 0 to {UNSEEN // APART - 1}, with 1 to {APART} samples"
+            )
     if weights is not None and plan.held_out:
         raise ValueError("weights that have seen all families cannot tell how well it does without")
     start = None
@@ -92,7 +112,13 @@ def train(
         start = weights_of(weights, ShapeNet())
         digest = hashlib.sha256(weights.read_bytes()).hexdigest()
         plan = replace(plan, start=digest, rate=GENTLE * plan.rate)
-    files = _samples(folder / "samples", plan.first, plan.samples, progress)
+    files = [
+        file
+        for own in plan.sets
+        for file in _samples(
+            folder / "samples", own.seed * APART, own.samples, progress, own.families or None
+        )
+    ]
     _samples(folder / "unseen", UNSEEN, CHECKED, progress)
     state = _State.resumed(folder, plan, start)
     begun = saved = time.monotonic()
@@ -108,13 +134,16 @@ def train(
     return state.file
 
 
-def _samples(folder: Path, first: int, count: int, progress: Progress) -> list[Path]:
-    write_shards(folder, first, count, progress)
+def _samples(
+    folder: Path, first: int, count: int, progress: Progress,
+    families: tuple[str, ...] | None = None,
+) -> list[Path]:  # fmt: skip
+    write_shards(folder, first, count, progress, families)
     return [folder / f"{seed:08d}.npz" for seed in range(first, first + count, SHARD)]
 
 
 def _endless(files: list[Path], plan: TrainingPlan, done: int) -> Iterator[Batch]:
-    number = done * plan.size // max(plan.samples, 1)
+    number = done * plan.size // max(plan.total, 1)
     while True:
         rng = np.random.default_rng([plan.seed, number, done])
         yield from batches(files, plan.size, rng, plan.held_out)
@@ -225,6 +254,22 @@ def trained(checkpoint: Path) -> ShapeNet:
     net = ShapeNet()
     net.load_state_dict(torch.load(checkpoint, map_location="cpu", weights_only=True)["mean"])
     return net.eval()
+
+
+def blended(net: ShapeNet, start: dict[str, Tensor], share: float) -> ShapeNet:
+    """Mix `share` of a network that went on from the weights `start` with them.
+
+    What lies between the two has forgotten less of what only the earlier samples show, and has
+    learned most of what the later ones do (Wortsman et al. 2022, Robust fine-tuning of zero-shot
+    models).
+    """
+    mixed = {
+        name: torch.lerp(start[name], value, share) if value.is_floating_point() else value
+        for name, value in net.state_dict().items()
+    }
+    blend = ShapeNet()
+    blend.load_state_dict(mixed)
+    return blend.eval()
 
 
 def figures(checkpoint: Path, net: ShapeNet) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from objectmorpher_core.lift.crop import SIDE  # noqa: E402
+from objectmorpher_core.models import registry  # noqa: E402
 from objectmorpher_core.models.onnx_session import open_session  # noqa: E402
 from objectmorpher_research.training import shape_data, train_shape  # noqa: E402
 from objectmorpher_research.training.shape_data import batch_of, packed  # noqa: E402
@@ -168,13 +170,32 @@ def test_training_goes_on_from_exported_weights(tmp_path):
         weights_of(path, other)
 
 
+def test_what_lies_between_two_networks_has_their_weights_mixed():
+    torch.manual_seed(0)
+    first, second = ShapeNet(), ShapeNet()
+    found = train_shape.blended(second, first.state_dict(), 0.25).state_dict()
+    for name, value in second.state_dict().items():
+        expected = 0.75 * first.state_dict()[name] + 0.25 * value
+        assert torch.allclose(found[name].to(expected.dtype), expected, atol=1e-6), name
+
+
+def test_a_set_of_samples_has_the_families_asked_for(tmp_path, networks, monkeypatch):
+    monkeypatch.setattr(shape_data, "SHARD", 2)
+    shape_data.write_shards(tmp_path, 2_000_000, 2, families=("prints",))
+    found = np.load(tmp_path / "02000000.npz")
+    assert found["family"].tolist() == ["prints"] * 2
+    assert found["tokens"].shape == found[shape_data.MIRRORED].shape == (2, WIDTH, GRID, GRID)
+
+
 @pytest.mark.slow
 def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, capsys):
     pytest.importorskip("onnx")
     from objectmorpher.cli.parser import main
 
-    for name, first, times in (("samples", 0, 4), ("unseen", train_shape.UNSEEN, 1)):
-        (tmp_path / name).mkdir()
+    sets = (("samples", 0, 4), ("samples", 3 * train_shape.APART, 4),
+            ("unseen", train_shape.UNSEEN, 1))  # fmt: skip
+    for name, first, times in sets:
+        (tmp_path / name).mkdir(exist_ok=True)
         several = {key: np.concatenate([array] * times) for key, array in arrays.items()}
         np.savez(tmp_path / name / f"{first:08d}.npz", **several)
     monkeypatch.setattr(train_shape, "CHECKED", COUNT)
@@ -186,7 +207,23 @@ def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, ca
     assert told["sha256"] == hashlib.sha256(weights).hexdigest()
     for way in ("network", "relief", "inflation"):
         assert 0 < told["means"][way]["front"] < 2
+    shipped = Path(registry.__file__).parent / "shape.onnx"
+    going_on = [*words, "--start", str(shipped), "--samples", "16", "--passes", "1",
+                "--also", "3:16", "--blend", "0.5", "-o", str(tmp_path / "next.onnx")]  # fmt: skip
+    assert main(going_on) == 0
+    told = json.loads((tmp_path / "next.json").read_text(encoding="utf-8"))
+    assert told["steps"] == 2 and told["blend"] == 0.5
+    assert told["plan"]["also"] == [{"seed": 3, "samples": 16, "families": []}]
+    assert (tmp_path / "next.onnx").read_bytes() != weights
     capsys.readouterr()
+    for wrong, reason in (
+        (["--also", "some"], "write SEED:N"),
+        (["--also", "1:32:unicorns"], "no family 'unicorns'"),
+        (["--also", "0:32"], "cannot have one seed"),
+        (["--blend", "0.5"], "--start"),
+    ):
+        assert main([*words, "--samples", "16", *wrong]) == 1
+        assert reason in capsys.readouterr().err
     assert main([*words, "--samples", "4"]) == 1
     assert "fewer than" in capsys.readouterr().err
     assert main([*words, "--hold-out", "boxes,unicorns"]) == 1
