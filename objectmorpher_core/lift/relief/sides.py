@@ -67,6 +67,10 @@ BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the col
 INWARD = 0.4  # of the matte's fringe, up to which its colours are not the object's
 MIX = 2  # px beside a hole that are no texture: they are mixed with it
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
+BEFORE = 3.0  # x spacing, by which what stands before something is nearer
+BEHIND = (
+    0.01  # share of a side's Gaussians that something hides, from which it has a picture without
+)
 MOST_TONED = 25.0  # levels, by which a side's tone follows the photo's where they meet
 GAP = 32  # px between the matte and the pictures, and between them
 
@@ -161,6 +165,7 @@ class _Picture:
 class _Side:
     """A view of Gaussians that show an invented picture of it."""
 
+    number: int  # of the picture, for its seed: it does not depend on which others there are
     view: _View
     index: np.ndarray  # (n,) of the Gaussians
     picture: _Picture
@@ -200,13 +205,13 @@ def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0
             (best == k) & (view.cosines > FACING) & view.is_aside(rest, RULES.look_aside) & is_side
         )
         if wanted.sum() >= 3:
-            sides.append(_side(view, np.flatnonzero(wanted), lit, matte, camera))
+            sides += _layers(k, view, np.flatnonzero(wanted), lit, matte, camera)
     sides = _apart(sides, lifted.world_points(rest.means), APART * rest.spacing)
     filled: list[U8 | None] = [None] * len(sides)
 
     def fill(first: int, last: int) -> None:
         for k in range(first, last):
-            filled[k] = _filled(sides[k], front, seed + k)
+            filled[k] = _filled(sides[k], front, seed + sides[k].number)
 
     in_threads(fill, len(sides), parts=len(sides))
     return _carried(lifted, sides, filled, (matte.left, matte.box[3] + GAP))
@@ -271,7 +276,36 @@ def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
     return RestSplats(own, photo)
 
 
-def _side(view: _View, wanted: np.ndarray, rest: RestSplats, matte: Matte, photo: Camera) -> _Side:
+def _layers(
+    number: int, view: _View, wanted: np.ndarray, rest: RestSplats, matte: Matte, photo: Camera
+) -> list[_Side]:
+    """What a view shows of the `wanted` Gaussians, and what it shows without what hides others.
+
+    The body of a mug is hidden behind its handle in every view: that has a picture without it.
+    """
+    side = _side(number, view, wanted, rest, matte, photo)
+    behind = np.setdiff1d(wanted, side.index)
+    if len(behind) < max(BEHIND * len(wanted), 3):
+        return [side]
+    lifted = rest.lifted
+    depth, xy = view.places[:, 2], view.xy
+    reach = APART * rest.spacing * view.camera.focal / float(np.median(depth))
+    near, which = KDTree(xy[behind]).query(xy, distance_upper_bound=reach)
+    hides = np.isfinite(near)
+    hides[hides] = depth[hides] < depth[behind[which[hides]]] - BEFORE * rest.spacing
+    opacities = np.where(hides, 0, lifted.gaussians.opacities).astype(np.float32)
+    bare = replace(lifted, gaussians=replace(lifted.gaussians, opacities=opacities))
+    others = wanted[~hides[wanted]]
+    sides = [_side(number, view, others, RestSplats(bare, photo), matte, photo)]
+    before = side.index[hides[side.index]]
+    if len(before) >= 3:
+        sides.append(_side(number + len(TURNS), view, before, rest, matte, photo))
+    return sides
+
+
+def _side(
+    number: int, view: _View, wanted: np.ndarray, rest: RestSplats, matte: Matte, photo: Camera
+) -> _Side:
     """What a view shows of the `wanted` Gaussians."""
     picture = view.drawn(rest, matte, photo)
     xy = view.xy[wanted]
@@ -282,7 +316,7 @@ def _side(view: _View, wanted: np.ndarray, rest: RestSplats, matte: Matte, photo
     there[row, column] = 0
     away = cv2.distanceTransform(there, cv2.DIST_L2, 5)
     reach = 2 * rest.spacing * view.camera.focal / float(np.median(view.places[:, 2]))
-    return _Side(view, wanted, picture, away < reach + EDGE)
+    return _Side(number, view, wanted, picture, away < reach + EDGE)
 
 
 def _is_seen(xy: F64, depth: F64, picture: _Picture, spacing: float) -> Mask:
@@ -290,7 +324,7 @@ def _is_seen(xy: F64, depth: F64, picture: _Picture, spacing: float) -> Mask:
     height, width = picture.depth.shape
     column, row = np.floor(xy).astype(int).T
     shown = picture.depth[row.clip(0, height - 1), column.clip(0, width - 1)]
-    return depth < shown + 3 * spacing
+    return depth < shown + BEFORE * spacing
 
 
 def side_by_side(pictures: list[U8]) -> U8:

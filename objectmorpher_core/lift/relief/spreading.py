@@ -103,6 +103,7 @@ def _at_half(line: RimLine, outline: ReliefSilhouette, matte: Matte) -> RimLine:
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
 WITHDRAWN = 0.3  # x mean spacing: so far inside an outline a sheet's points are, but for its chain
+BARELY = 0.1  # likewise where it is seen edge-on, of which a px is many in depth: no gap is left
 COVERED = 1.25  # x mean spacing: so far beyond a part's end it is drawn over what is behind
 MIXED = 0.45  # x mean spacing: so far within a part's end the photo shows some of what is behind
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
@@ -156,9 +157,12 @@ def spread(
     if solid is not None:
         chains[0] = np.vstack([chains[0], _seen_edges(solid, lines, outline, spacing)])
         chains[1] = chains[1][~_is_own(solid, outline, chains[1])]
-    drawn = [_draw(outline, area * density, rng) for area in areas]
-    drawn = [xy[_is_within(xy, lines, outline, WITHDRAWN * spacing)] for xy in drawn]
-    drawn = [np.vstack([chain, xy]) for chain, xy in zip(chains, drawn, strict=True)]
+    drawn = [
+        np.vstack(
+            [chain, _withdrawn(body, _draw(outline, area * density, rng), side, lines, spacing)]
+        )
+        for chain, area, side in zip(chains, areas, (FRONT, BACK), strict=True)
+    ]
     around = [(_brim(body, band, spacing, density, rng), 0)]
     around += _inner(body, spacing, density, rng)
     # Most candidates of the sheets are dropped: their normals are found when that is done.
@@ -224,18 +228,32 @@ def _draw(outline: ReliefSilhouette, expected: F64, rng: np.random.Generator) ->
     return outline.photo_xy(scattered(expected, rng) - 0.5)
 
 
-def _is_within(xy: F64, lines: list[RimLine], outline: ReliefSilhouette, depth: float) -> Mask:
+def _withdrawn(body: ReliefBody, xy: F64, side: float, lines: list[RimLine], spacing: float) -> F64:
+    """Those of the photo px (N, 2) of a sheet that do not stick out beyond its chain."""
+    depth, outline = WITHDRAWN * spacing, body.silhouette
+    is_within = _is_within(xy, lines, outline, depth)
+    beside = np.flatnonzero(~is_within)
+    _, gradient = body.sample(xy[beside], side)
+    seen = depth / np.sqrt(1 + (gradient**2).sum(1))
+    is_within[beside] = _is_within(xy[beside], lines, outline, np.maximum(seen, BARELY * spacing))
+    return xy[is_within]
+
+
+def _is_within(
+    xy: F64, lines: list[RimLine], outline: ReliefSilhouette, depth: float | F64
+) -> Mask:
     """Which photo px (N, 2) are `depth` px inside the lines, or half of what there is of a hair."""
     found = np.ones(len(xy), bool)
     if not lines:
         return found
     away, radius = bilinear(np.stack([outline.depth, outline.radius], -1), outline.grid_xy(xy)).T
+    depth = np.broadcast_to(depth, len(xy))
     near = np.flatnonzero(away < depth + 2 * outline.cell)
     rim = outline.photo_xy(np.concatenate([line.xy for line in lines]))
     _, nearest = KDTree(rim).query(xy[near])
     inward = np.concatenate([line.inward for line in lines])[nearest]
     inside = ((xy[near] - rim[nearest]) * inward).sum(1)
-    found[near] = inside >= np.minimum(depth, 0.5 * radius[near])
+    found[near] = inside >= np.minimum(depth, 0.5 * radius)[near]
     return found
 
 

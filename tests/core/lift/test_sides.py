@@ -104,6 +104,28 @@ def test_stripes_go_on_where_the_photo_ends(vase, yaw):
     assert (misfit > 40 / 255).mean() < 0.11  # on another stripe
 
 
+def test_what_a_handle_hides_from_every_side_has_a_picture_too():
+    """Of a can with a handle, turned so far that one sees its body between the two."""
+    y, x = np.mgrid[:240, :260] + 0.5
+    away = np.hypot((x - 150) / 62, (y - 125) / 66)
+    handle = (x > 150) & (away < 1) & (away > 0.66)
+    body = (np.abs(x - 100) < 55) & (np.abs(y - 125) < 90)
+    stripes = np.array([(226, 84, 48), (244, 214, 150)])[(y / 9).astype(int) % 2]
+    pixels = np.where((body | handle)[..., None], stripes, (0, 0, 0)).astype(np.uint8)
+    scene = shapes.lifted_scene(pixels, body | handle, 6000)
+    lifted, camera = scene.lifted, scene.camera
+    assert lifted.sides is not None
+    rest = RestSplats(replace(lifted, sides=None), camera)
+    for yaw in (50.0, -50.0):
+        motion = Placement(turn=(yaw, 0.0, 0.0)).matrix(lifted, camera)
+        world = lifted.world_points(rest.means) @ motion[:3, :3].T + motion[:3, 3]
+        normals = rest.normals @ motion[:3, :3].T
+        cosines = -(normals * world).sum(1) / np.linalg.norm(world, axis=1)
+        new = lifted.is_body & (cosines > 0.35) & (rest.cosines < 0.5 * RULES.look_aside * cosines)
+        assert new.sum() > 100
+        assert (lifted.sides.zoom[new] > 0).mean() > 0.95
+
+
 def test_nothing_but_the_object_can_be_looked_up(vase):
     """Neither between the pictures, nor beside them, nor from the photo's background."""
     darkest = 84 / 255  # of the green of the darker stripe

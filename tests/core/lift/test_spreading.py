@@ -100,6 +100,22 @@ def test_no_place_of_the_front_is_without_a_point(name):
     assert gap.max() < 3 * max(spacing, body.silhouette.cell)
 
 
+@pytest.mark.parametrize("name", ["disc", "ellipse", "frame", "star"])
+def test_no_gap_opens_where_the_front_is_seen_edge_on(name):
+    """A lid of which the photo shows a line: one px from its rim is 20 deep."""
+    plain = _body(name)
+    outline = plain.silhouette
+    rows = np.arange(outline.shape[0])[:, None]
+    body = plain.nearer(20 * outline.cell * rows * np.ones(outline.shape))
+    surface, spacing = spread(body, 6000, BAND, np.random.default_rng(0))
+    tree, cells = cKDTree(_points(surface)), np.argwhere(outline.inside)[:, ::-1]
+    for down in np.linspace(-0.4, 0.4, 5):
+        xy = outline.photo_xy(cells + np.array([0.0, down]))
+        height, _ = body.sample(xy, FRONT)
+        gap = tree.query(np.column_stack([xy, height]))[0]
+        assert gap.max() < 1.1 * spacing
+
+
 @pytest.mark.parametrize("count", [500, 2000, 6000])
 def test_about_as_many_points_as_asked(count):
     surface, _ = spread(_body("box"), count, BAND, np.random.default_rng(0))
