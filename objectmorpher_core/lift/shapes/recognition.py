@@ -268,7 +268,7 @@ def completed(
     body = replace(body, middle=body.middle + trust * places.weight * lean)
     is_sure = shape.kind == "box" and shape.misfit.outline < SURELY
     stray = STRAY * (FARTHER if is_sure else 1)
-    share = trust * _share(places, front + lean - near, body, stray)
+    share = trust * _share(places, _across(front + lean - near, near, outline.cell), body, stray)
     half = 0.5 * (near - far)
     sides = [side.towards(thickness * half, share) for side in (body.front, body.back)]
     middle = body.middle + share * (near - half - body.middle)
@@ -343,6 +343,20 @@ def _whole(body: ReliefBody, share: F64) -> ReliefBody:
     own = None if cuts is None or body.own is None else 1 - (1 - share) * (1 - body.own)
     sides = [replace(side, cuts=cuts) for side in (body.front, body.back)]
     return replace(body, front=sides[0], back=sides[1], cuts=cuts, own=own)
+
+
+def _across(off: F64, near: F64, cell: float) -> F64:
+    """(h, w) px: how far off a front that is `off` along the rays is across a shape, `near` it.
+
+    Of a lid that is seen nearly edge-on a pixel is as deep as the lid is wide.
+    """
+    square = np.ones(near.shape)
+    for axis in (0, 1):
+        steps = np.abs(np.diff(near, axis=axis)) / cell
+        sides = [np.insert(steps, at, np.inf, axis=axis) for at in (0, steps.shape[axis])]
+        slope = np.minimum(*sides)  # where a surface ends before another it is that surface's
+        square += np.where(np.isfinite(slope), slope, 0.0) ** 2
+    return np.asarray(off / np.sqrt(square), np.float64)
 
 
 def _share(places: PlacedShape, off: F64, body: ReliefBody, stray: float) -> F64:

@@ -161,6 +161,23 @@ def test_a_shape_rights_what_a_network_sees_lean() -> None:
     assert after < 0.5 * before
 
 
+def test_a_lid_seen_nearly_edge_on_reaches_its_far_rim() -> None:
+    """The network sees its near rim only; across it that is hardly wrong, along the rays it is."""
+    axis = turn_matrix(0, 12, 0)[:, 1]
+    steps = np.linspace(-0.25, 0.25, 12)
+    seen, true = see(revolved(AT + steps[:, None] * axis, np.full(12, 0.28), axis))
+    lid = seen.mask & (np.abs(seen.normal @ axis) > 0.9)
+    rim = float(np.quantile(seen.front[lid], 0.9))
+    blurred = replace(seen, front=np.where(lid, np.maximum(seen.front, rim), seen.front))
+    found = recognised(blurred, "round")
+    assert found is not None
+    body, camera = body_of(blurred)
+    whole = completed(fused(body, blurred, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
+    own = as_far(surfaces_of(whole, seen.mask), true, seen.mask & ~lid, camera)
+    deep = float(np.ptp(true.front[lid]))
+    assert np.abs(own.front - true.front)[lid].mean() < 0.15 * deep
+
+
 def test_the_artist_says_what_it_is() -> None:
     seen, _ = seen_of("ball")
     for kind in ("flat", "box", "round"):
