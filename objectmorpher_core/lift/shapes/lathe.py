@@ -21,7 +21,8 @@ from .evidence import STRIDE, Evidence
 from .solids import AROUND, Mesh, revolved
 
 TRIED = 40  # places on the axis, at which the profile's ends are looked for
-PLACES = 24  # of the profile itself
+PLACES = 24  # of the profile itself, while its axis is looked for
+FINER = 48, 96  # of one that is shown, and of one with steps, as of a lamp's shade
 STRAIGHT = 0.05  # radians from one place to the next, that are noise of the outline
 TRIM = 0.002  # x the outline's area, that the outline may lose at each end
 CORNERS = 24  # of a circle, that are looked up in the outline
@@ -87,11 +88,11 @@ class Lathe:
         ends = float(own.min()) - half, float(own.max()) + half
         return Lathe(middle, along, *ends, inside, start, step, depth)
 
-    def profile(self, lean: float, change: F64) -> Profile | None:
+    def profile(self, lean: float, change: F64, places: int = PLACES) -> Profile | None:
         """About an axis that leans so much away from the picture's plane, radians.
 
         `change` (2,): of its angle in the picture, radians, and of its place across, tangents.
-        None where no circle fits.
+        It has so many `places`. None where no circle fits.
         """
         cosine, sine = np.cos(change[0]), np.sin(change[0])
         along = np.array([[cosine, -sine], [sine, cosine]]) @ self.along
@@ -109,9 +110,9 @@ class Lathe:
         most = 2 * self.depth * (self.high - self.low) / max(np.cos(lean), 0.1)
         most = min(most, NEAREST * self.depth / max(abs(axis[2]), 1e-3))
         steps = np.clip(steps, -most, most)
-        return self._fitted(centre, steps, axis)
+        return self._fitted(centre, steps, axis, places)
 
-    def _fitted(self, centre: F64, steps: F64, axis: F64) -> Profile | None:
+    def _fitted(self, centre: F64, steps: F64, axis: F64, places: int) -> Profile | None:
         u = np.asarray(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]), np.float64)
         u /= np.linalg.norm(u)
         v = np.cross(axis, u)
@@ -130,13 +131,19 @@ class Lathe:
         steps, found = steps[held[0] : held[-1] + 1], found[held[0] : held[-1] + 1]
         first, last = self._ends(centre + steps[:, None] * axis, found, ways)
         ends = np.interp([first, last], range(len(steps)), steps)
-        even = np.linspace(ends[0], ends[1], PLACES)
-        own = radii(even)
-        own = np.maximum(own, 0.5 * np.interp(even, steps, found))
-        for _ in range(2):
-            own[1:-1] = np.convolve(own, [0.25, 0.5, 0.25], "valid")
-        slope = np.arctan2(np.diff(own), np.diff(even))
+
+        def evened(places: int) -> tuple[F64, F64]:
+            at = np.linspace(ends[0], ends[1], places)
+            own = np.maximum(radii(at), 0.5 * np.interp(at, steps, found))
+            for _ in range(2):
+                own[1:-1] = np.convolve(own, [0.25, 0.5, 0.25], "valid")
+            return at, own
+
+        even, own = evened(PLACES)
+        slope = np.arctan2(np.diff(own), np.diff(even))  # of more places it would be noise
         bend = float(np.maximum(np.abs(np.diff(slope)) - STRAIGHT, 0.0).sum())
+        if places != PLACES:
+            even, own = evened(places)
         return Profile(centre + even[:, None] * axis, own, axis, bend)
 
     def _ends(self, places: F64, radii: F64, ways: F64) -> tuple[float, float]:

@@ -29,9 +29,11 @@ BEYOND = 2.0  # cells from a shape's own outline, up to which its sides go on
 MISSED = 4.0  # cells from a shape's outline, up to which a silhouette ends as it does
 REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside it
 # Of a shape's description: outline, depth and normals, each 1 where it is as far off as expected;
-# what of the mask it leaves out; and that a surface of revolution may have any profile. The outline
-# counts most: the network's depth and normals are blurred, and rounder than what they are of.
+# what of the mask it leaves out; that a surface of revolution may have any profile, and of the
+# profile's bend (radians) the logarithm of one more. The outline counts most: the network's depth
+# and normals are blurred, and rounder than what they are of.
 WEIGHTS, LEFT_OUT, PROFILE = (3.0, 0.5, 0.5), 8.0, (0.1, 0.5)
+STEM = 0.2  # description that is left out, from which a thing is looked at with all its thin parts
 LONGEST = 2.5  # description, of which half are what they are said to be
 WIDTH = 0.25  # of descriptions, over which that changes
 LEAST = 0.3  # weight, below which an object is free
@@ -200,9 +202,15 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
     if (ring := fit_ring(core)) is not None:
         return _described(kind, ring, evidence, left_out)
     fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
-    if fits[0].weight < EXPLAINED and (turned := fit_revolution(core)) is not None:
-        more = left_out + PROFILE[0] + PROFILE[1] * turned[2]
-        fits.append(_described(kind, turned[:2], evidence, more))
+    # A foot on a thin stem is no handle: what is nothing without is looked at with it.
+    looks = [(core, left_out, EXPLAINED)] + [(evidence, 0.0, LEAST)] * (left_out > STEM)
+    for part, more, enough in looks:
+        if (
+            max(fit.weight for fit in fits) < enough
+            and (turned := fit_revolution(part)) is not None
+        ):
+            more += PROFILE[0] + PROFILE[1] * float(np.log1p(turned[2]))
+            fits.append(_described(kind, turned[:2], evidence, more))
     return min(fits, key=_length)
 
 

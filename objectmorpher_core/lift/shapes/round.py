@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.arrays import F64, Mask
 from .evidence import HOPELESS, STRIDE, Evidence, Misfit, least
-from .lathe import Lathe, Profile
+from .lathe import FINER, PLACES, Lathe, Profile
 from .solids import AROUND, FINE, Mesh, drawn, ellipsoid, tube
 
 # A ring that looks like the photo: a round tube about an axis, as a doughnut, a tyre, a bracelet.
@@ -154,6 +154,7 @@ def _ellipse(part: Mask, evidence: Evidence) -> Ellipse:
 
 LEANS = np.radians([4.0, 15.0, 28.0, 42.0, 58.0, 74.0])  # of the axis from the picture's plane
 STEEPEST = 1.5  # radians, likewise
+STEPPED = 0.3  # misfit that more places on the axis explain, where the profile has steps
 SIMPLER = 1.0  # misfit that a radian of a profile's bend outweighs
 ALIKE = 0.998  # cosine between two axes that are tried as one
 ROUNDER = 0.5  # misfit that an ellipsoid outweighs, odd in depth by one of its steps
@@ -240,8 +241,9 @@ def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit, float] | None:
 
 
 def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfit, float]:
-    def built(numbers: F64) -> Profile | None:
-        return lathe.profile(float(np.clip(lean + numbers[0], -STEEPEST, STEEPEST)), numbers[1:])
+    def built(numbers: F64, places: int = PLACES) -> Profile | None:
+        own = float(np.clip(lean + numbers[0], -STEEPEST, STEEPEST))
+        return lathe.profile(own, numbers[1:], places)
 
     def cost(numbers: F64) -> float:
         profile = built(numbers)
@@ -250,12 +252,18 @@ def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfi
         return evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
 
     steps = np.array([0.15, 0.04, 0.03 * (lathe.high - lathe.low)])
-    profile = built(least(cost, np.zeros(3), steps))
-    assert profile is not None, "its start was one"
+    numbers = least(cost, np.zeros(3), steps)
+    profile, stepped = (built(numbers, places) for places in FINER)
+    assert profile is not None and stepped is not None, "its start was one"
     shapes = [profile.capped(cap) for cap in CAPS]
     fits = [evidence.misfit(shape.mesh()) for shape in shapes]
     best = int(np.argmin([fit.total for fit in fits]))
-    return shapes[best].mesh(FINE), fits[best], profile.bend
+    shape, fit = shapes[best], fits[best]
+    stepped = stepped.capped(CAPS[best])
+    other = evidence.misfit(stepped.mesh())
+    if other.total < fit.total - STEPPED:
+        shape, fit = stepped, other
+    return shape.mesh(FINE), fit, profile.bend
 
 
 def _lathes(evidence: Evidence) -> list[Lathe]:

@@ -68,12 +68,29 @@ def _vase() -> Mesh:
     return revolved(AT + steps[:, None] * axis, 0.15 + 0.07 * np.sin(9 * steps), axis)
 
 
+def _lamp() -> Mesh:
+    """Its shade ends in a step, which few places on the axis would even out."""
+    axis = turn_matrix(0, -15, 4)[:, 1]
+    steps = np.array([-0.34, -0.06, -0.06, 0.32])
+    radii = np.array([0.11, 0.2, 0.06, 0.14])
+    return revolved(AT + steps[:, None] * axis, radii, axis)
+
+
+def _goblet() -> Mesh:
+    """Its foot on a thin stem is no handle."""
+    axis = turn_matrix(0, -20, 0)[:, 1]
+    steps = np.array([-0.34, -0.2, -0.1, -0.06, 0.2, 0.26, 0.28])
+    radii = np.array([0.17, 0.18, 0.1, 0.025, 0.025, 0.14, 0.14])
+    return revolved(AT + steps[:, None] * axis, radii, axis)
+
+
 def _doughnut() -> Mesh:
     return tube(AT, turn_matrix(20, -50, 0)[:, 1], np.array([0.22, 0.1, 0.08]), 96)
 
 
 MADE = {
     "box": _box, "ball": _ball, "can": _can, "leaf": _leaf, "vase": _vase, "doughnut": _doughnut,
+    "lamp": _lamp, "goblet": _goblet,
 }  # fmt: skip
 FIVE_DEGREES = np.cos(np.radians(5.0))
 KINDS = {"box": "box", "leaf": "flat"}  # the others are round
