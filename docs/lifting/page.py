@@ -74,8 +74,8 @@ makes a thing wholly the plain shape that it looks like was chosen on ball, box,
 and robot. Eight of those held out were looked at afterwards: vase and beaker changed, and gain
 0.1 dB. Where rims lie was chosen on box, brick, mug and ball; how a shape's sides go on beyond
 their common edge was found on the beaker. Domino and card were looked at while boxes were fitted to
-their outlines. Means over both directions of a turn; `make_lifting.py quick NAME ...` prints each
-turn of one.
+their outlines, and lamp, vase and beaker while profiles got steps. Means over both directions of a
+turn; `make_lifting.py quick NAME ...` prints each turn of one.
 
 - **Wobble**: the total absolute curvature of the outline over the true one's (evenly resampled,
   smoothed by 1 % of the square root of the area, without the frame). 1 bends as the truth does.
@@ -129,6 +129,12 @@ now, a turn by 35 at 19.2 and 23.0 dB, a pitch by 20 at 19.7 and 24.0. Box, bric
 were looked at while this was made; a turn of the latter two by 20 degrees was at 17.7 and 17.2 dB.
 The same for surfaces of revolution gains 0.2 dB on ball and ring and costs the vase 0.6; it is left
 out.
+
+A profile read off at 24 places, and smoothed, cannot follow a lamp's shade, and a goblet's foot on
+its stem was taken for a handle. Of 40 made vessels and 80 other made things on which nothing was
+chosen 22 of the vessels are found (16 before) and 7 of the others are called round (5 before, both
+further ones rightly turned nearer to the truth). Of a lid that is seen nearly edge-on the network
+sees little: how far it is off from a shape is measured across that shape, not along the rays.
 
 The network looks at an object and at its mirror image, and the mean of both is used: what it gets
 wrong in one it seldom gets equally wrong in the other. Before, fronts were off by 0.182 and
