@@ -103,7 +103,7 @@ def _at_half(line: RimLine, outline: ReliefSilhouette, matte: Matte) -> RimLine:
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
 WITHDRAWN = 0.3  # x mean spacing: so far inside an outline a sheet's points are, but for its chain
-BARELY = 0.16  # likewise where it is seen edge-on, of which a px is many in depth: no gap is left
+BARELY = 0.14  # likewise where it is seen edge-on, of which a px is many in depth: no gap is left
 COVERED = 1.25  # x mean spacing: so far beyond a part's end it is drawn over what is behind
 MIXED = 0.45  # x mean spacing: so far within a part's end the photo shows some of what is behind
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
