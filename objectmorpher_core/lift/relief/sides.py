@@ -290,7 +290,7 @@ def _layers(
     lifted = rest.lifted
     depth, xy = view.places[:, 2], view.xy
     reach = APART * rest.spacing * view.camera.focal / float(np.median(depth))
-    near, which = KDTree(xy[behind]).query(xy, distance_upper_bound=reach)
+    near, which = map(np.asarray, KDTree(xy[behind]).query(xy, distance_upper_bound=reach))
     hides = np.isfinite(near)
     hides[hides] = depth[hides] < depth[behind[which[hides]]] - BEFORE * rest.spacing
     opacities = np.where(hides, 0, lifted.gaussians.opacities).astype(np.float32)

@@ -343,7 +343,7 @@ def _train_shape(options: argparse.Namespace) -> None:
     with progress_bar("training") as progress:
         checkpoint = train(options.folder, plan, options.minutes, progress, options.start)
     net = trained(checkpoint)
-    if options.blend < 1:
+    if options.start is not None and options.blend < 1:
         net = blended(net, weights_of(options.start, ShapeNet()), options.blend)
     found = {**figures(checkpoint, net), "blend": options.blend}
     weights = options.output or options.folder / "shape.onnx"
