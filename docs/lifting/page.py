@@ -132,8 +132,8 @@ out.
 
 A profile read off at 24 places, and smoothed, cannot follow a lamp's shade, and a goblet's foot on
 its stem was taken for a handle. Of 40 made vessels and 80 other made things on which nothing was
-chosen 22 of the vessels are found (16 before) and 7 of the others are called round (5 before, both
-further ones rightly turned nearer to the truth). Of a lid that is seen nearly edge-on the network
+chosen 22 of the vessels are found (16 before) and 7 of the others are called round (5 before; both
+further ones came nearer to the truth). Of a lid that is seen nearly edge-on the network
 sees little: how far it is off from a shape is measured across that shape, not along the rays.
 
 The network looks at an object and at its mirror image, and the mean of both is used: what it gets

@@ -68,9 +68,7 @@ INWARD = 0.4  # of the matte's fringe, up to which its colours are not the objec
 MIX = 2  # px beside a hole that are no texture: they are mixed with it
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
 BEFORE = 3.0  # x spacing, by which what stands before something is nearer
-BEHIND = (
-    0.01  # share of a side's Gaussians that something hides, from which it has a picture without
-)
+BEHIND = 0.01  # share of a side's Gaussians, from which what something hides has a picture
 MOST_TONED = 25.0  # levels, by which a side's tone follows the photo's where they meet
 GAP = 32  # px between the matte and the pictures, and between them
 
@@ -107,6 +105,10 @@ class _View:
     def xy(self) -> F64:
         """(N, 2) px of the picture."""
         return np.asarray(self.camera.project(self.places), np.float64)
+
+    def px(self, length: float) -> float:
+        """How long something of this length, world units, is in the picture, about."""
+        return length * self.camera.focal / float(np.median(self.places[:, 2]))
 
     def drawn(self, rest: RestSplats, matte: Matte, photo: Camera) -> _Picture:
         """What the photo shows of this view; `rest` has the colours of what it does not.
@@ -283,40 +285,37 @@ def _layers(
 
     The body of a mug is hidden behind its handle in every view: that has a picture without it.
     """
-    side = _side(number, view, wanted, rest, matte, photo)
+    whole = view.drawn(rest, matte, photo)
+    side = _side(number, view, wanted, whole, rest.spacing)
     behind = np.setdiff1d(wanted, side.index)
     if len(behind) < max(BEHIND * len(wanted), 3):
         return [side]
     lifted = rest.lifted
     depth, xy = view.places[:, 2], view.xy
-    reach = APART * rest.spacing * view.camera.focal / float(np.median(depth))
+    reach = view.px(APART * rest.spacing)
     near, which = map(np.asarray, KDTree(xy[behind]).query(xy, distance_upper_bound=reach))
     hides = np.isfinite(near)
     hides[hides] = depth[hides] < depth[behind[which[hides]]] - BEFORE * rest.spacing
     opacities = np.where(hides, 0, lifted.gaussians.opacities).astype(np.float32)
     bare = replace(lifted, gaussians=replace(lifted.gaussians, opacities=opacities))
-    others = wanted[~hides[wanted]]
-    sides = [_side(number, view, others, RestSplats(bare, photo), matte, photo)]
+    picture = view.drawn(RestSplats(bare, photo), matte, photo)
+    sides = [_side(number, view, wanted[~hides[wanted]], picture, rest.spacing)]
     before = side.index[hides[side.index]]
     if len(before) >= 3:
-        sides.append(_side(number + len(TURNS), view, before, rest, matte, photo))
+        sides.append(_side(number + len(TURNS), view, before, whole, rest.spacing))
     return sides
 
 
-def _side(
-    number: int, view: _View, wanted: np.ndarray, rest: RestSplats, matte: Matte, photo: Camera
-) -> _Side:
-    """What a view shows of the `wanted` Gaussians."""
-    picture = view.drawn(rest, matte, photo)
+def _side(number: int, view: _View, wanted: np.ndarray, picture: _Picture, spacing: float) -> _Side:
+    """What the picture of a view shows of the `wanted` Gaussians, `spacing` apart."""
     xy = view.xy[wanted]
-    is_seen = _is_seen(xy, view.places[wanted, 2], picture, rest.spacing)
+    is_seen = _is_seen(xy, view.places[wanted, 2], picture, spacing)
     wanted, xy = wanted[is_seen], xy[is_seen]
     there = np.ones(picture.is_known.shape, np.uint8)
     column, row = np.floor(xy).astype(int).T
     there[row, column] = 0
     away = cv2.distanceTransform(there, cv2.DIST_L2, 5)
-    reach = 2 * rest.spacing * view.camera.focal / float(np.median(view.places[:, 2]))
-    return _Side(number, view, wanted, picture, away < reach + EDGE)
+    return _Side(number, view, wanted, picture, away < view.px(2 * spacing) + EDGE)
 
 
 def _is_seen(xy: F64, depth: F64, picture: _Picture, spacing: float) -> Mask:

@@ -103,7 +103,7 @@ def _at_half(line: RimLine, outline: ReliefSilhouette, matte: Matte) -> RimLine:
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
 WITHDRAWN = 0.3  # x mean spacing: so far inside an outline a sheet's points are, but for its chain
-BARELY = 0.14  # likewise where it is seen edge-on, of which a px is many in depth: no gap is left
+BARELY = 0.14  # likewise, at least, where a sheet is seen edge-on and a px of it is many deep
 COVERED = 1.25  # x mean spacing: so far beyond a part's end it is drawn over what is behind
 MIXED = 0.45  # x mean spacing: so far within a part's end the photo shows some of what is behind
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
@@ -157,12 +157,10 @@ def spread(
     if solid is not None:
         chains[0] = np.vstack([chains[0], _seen_edges(solid, lines, outline, spacing)])
         chains[1] = chains[1][~_is_own(solid, outline, chains[1])]
-    drawn = [
-        np.vstack(
-            [chain, _withdrawn(body, _draw(outline, area * density, rng), side, lines, spacing)]
-        )
-        for chain, area, side in zip(chains, areas, (FRONT, BACK), strict=True)
-    ]
+    drawn = []
+    for chain, area, side in zip(chains, areas, (FRONT, BACK), strict=True):
+        xy = _draw(outline, area * density, rng)
+        drawn.append(np.vstack([chain, _withdrawn(body, xy, side, lines, spacing)]))
     around = [(_brim(body, band, spacing, density, rng), 0)]
     around += _inner(body, spacing, density, rng)
     # Most candidates of the sheets are dropped: their normals are found when that is done.

@@ -202,7 +202,8 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
     if (ring := fit_ring(core)) is not None:
         return _described(kind, ring, evidence, left_out)
     fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
-    # A foot on a thin stem is no handle: what is hardly that without is looked at with it.
+    # A foot on a thin stem is no handle: what is not surely round without its thin parts is
+    # looked at with them.
     looks = [(core, left_out, EXPLAINED)] + [(evidence, 0.0, WHOLE)] * (left_out > STEM)
     for part, more, enough in looks:
         if (

@@ -51,7 +51,7 @@ def _add_shape(parser: argparse.ArgumentParser) -> None:
     add("--hold-out", type=_words, metavar="A,B", help="families that are not trained on")
     add("--start", type=Path, metavar="ONNX", help="exported weights to go on from")
     add("--blend", type=float, default=1.0, metavar="X",
-        help="share of the weights trained, beside those of --start; default 1")  # fmt: skip
+        help="share of the trained weights; the rest are those of --start")  # fmt: skip
     add("--seed", type=int, default=0, help="0 to 49; another seed draws other samples")
     add("--also", action="append", default=[], metavar="SEED:N[:A,B]",
         help="N samples of another seed as well, of these families only")  # fmt: skip

@@ -59,7 +59,7 @@ def write_shards(
         for seed in range(first, first + count, SHARD)
         if not (folder / f"{seed:08d}.npz").exists()
     ]
-    # Processes of their own: forked from one whose networks have threads, some never end.
+    # Spawned, not forked: a copy of a process whose networks have threads may never end.
     apart = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(os.cpu_count(), apart, _begin) as pool:
         for number, _ in enumerate(pool.map(_write, wanted), 1):

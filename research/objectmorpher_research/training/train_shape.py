@@ -41,7 +41,7 @@ SAVED = 120.0  # s between two checkpoints
 
 @dataclass(frozen=True)
 class SampleSet:
-    """Samples that are drawn beside those of a plan."""
+    """Samples of one seed; a plan may draw several such sets."""
 
     seed: int
     samples: int
@@ -59,7 +59,7 @@ class TrainingPlan:
     decay: float = 0.02
     held_out: tuple[str, ...] = ()  # families that are not trained on
     seed: int = 0  # another one has other samples
-    also: tuple[SampleSet, ...] = ()
+    also: tuple[SampleSet, ...] = ()  # sets that are drawn beside its own
     start: str = ""  # SHA-256 of the weights that it goes on from; none: from nothing
 
     @property
@@ -73,6 +73,7 @@ class TrainingPlan:
 
     @property
     def sets(self) -> tuple[SampleSet, ...]:
+        """Its own samples, and all further ones."""
         return (SampleSet(self.seed, self.samples), *self.also)
 
     @property
