@@ -23,6 +23,7 @@ from ..raster.texture import TextureLevels
 from ..raster.tiles import Drawable
 from .deformer import Deformer
 from .resampling import Split, split_stretched, thinned
+from .skinning import Skinned
 
 DRAFT = 8_000  # solid Gaussians of a picture that must be quick
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual
@@ -98,10 +99,13 @@ class Puppet:
         if len(split.parents) == len(whole.points):
             return self._posed_whole(pose, placement)
         lifted = self._lifted_of(split)
-        pieces = lifted.gaussians
-        skinned = self.deformer.skin_points(pieces.means, pose, pieces.normals)
+        # Pieces keep their parent's motion: were each skinned by itself, those of a Gaussian
+        # stretched beyond the limit of its Jacobian would move apart farther than they reach.
+        linear = whole.linear[split.parents]
+        offsets = lifted.gaussians.means - self.lifted.gaussians.means[split.parents]
+        points = whole.points[split.parents] + (linear @ offsets[:, :, None])[:, :, 0]
         matrix = placement.matrix(self.lifted, self.camera)
-        return PosedSplats(RestSplats(lifted, self.camera), skinned, matrix)
+        return PosedSplats(RestSplats(lifted, self.camera), Skinned(points, linear), matrix)
 
     @property
     def has_draft(self) -> bool:
