@@ -7,6 +7,7 @@ reads, is fetched. Without that there is no look, and the silhouette alone tells
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any
@@ -38,6 +39,7 @@ class SeenShape:
     edge: F32  # probability that the surface ends beside here, before a farther part
     front_error: F32  # expected
     depth_error: F32  # expected
+    flatness: float = -math.inf  # log odds that the object is flat, as a leaf, a card or a sign
 
     @property
     def doubt(self) -> float:
@@ -48,12 +50,12 @@ class SeenShape:
         return float(error / size)
 
     @staticmethod
-    def of(raw: F32, mask: Mask, crop: Crop) -> SeenShape:
+    def of(raw: F32, mask: Mask, crop: Crop, flatness: float = -math.inf) -> SeenShape:
         """Read the network's output, (9, s, s); see `training.shape_net`."""
         return SeenShape(
             crop, mask, raw[0] - raw[0][mask].mean(), raw[1], np.maximum(raw[1], raw[2]),
             _unit(raw[NORMAL]).transpose(1, 2, 0), 1 / (1 + np.exp(-np.maximum(raw[6], NO_EDGE))),
-            np.exp(raw[7]), np.exp(raw[8]),
+            np.exp(raw[7]), np.exp(raw[8]), flatness,
         )  # fmt: skip
 
 
@@ -91,20 +93,22 @@ class ShapeModel:
         What the network gets wrong in one it seldom gets equally wrong in the other.
         """
         mirrored = crop.tangents * np.array([-1, 1, 1], np.float32)
-        direct = self._raw(rgb, mask, crop.tangents)
-        other = self._raw(rgb[:, ::-1], mask[:, ::-1], mirrored)[:, :, ::-1]
+        direct, one = self._raw(rgb, mask, crop.tangents)
+        other, two = self._raw(rgb[:, ::-1], mask[:, ::-1], mirrored)
+        other = other[:, :, ::-1]
         other[SIDEWAYS] *= -1
-        return SeenShape.of(0.5 * (direct + other), mask, crop)
+        return SeenShape.of(0.5 * (direct + other), mask, crop, 0.5 * (one + two))
 
-    def _raw(self, rgb: RGB, mask: Mask, tangents: F32) -> F32:
-        """(9, s, s) what the network says, its normals unit vectors."""
+    def _raw(self, rgb: RGB, mask: Mask, tangents: F32) -> tuple[F32, float]:
+        """(9, s, s) what the network says, its normals unit vectors; log odds that it is flat."""
         rgb, mask = np.ascontiguousarray(rgb), np.ascontiguousarray(mask)
         tokens = dino_tokens.shared().inner_tokens(rgb)
         wanted = {"planes": planes_of(rgb, mask, tangents), "tokens": tokens.transpose(2, 0, 1)}
         whole = {name: np.ascontiguousarray(value[None]) for name, value in wanted.items()}
-        raw = np.array(self._session.run(None, whole)[0][0], np.float32)
+        shape, flat = self._session.run(None, whole)
+        raw = np.array(shape[0], np.float32)
         raw[NORMAL] = _unit(raw[NORMAL])
-        return raw
+        return raw, float(flat[0])
 
 
 class _Memory:

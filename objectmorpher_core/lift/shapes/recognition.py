@@ -38,14 +38,11 @@ LONGEST = 2.5  # description, of which half are what they are said to be
 WIDTH = 0.25  # of descriptions, over which that changes
 LEAST = 0.3  # weight, below which an object is free
 WHOLE = 0.85  # weight, from which it is nothing but the shape
-# Weight from which a thing is flat. A solid that is taken for a sheet loses 4 dB when it turns; a
-# sheet that is left free is only puffed. Of forty solids none is above this, of forty sheets 29.
-FLAT = 0.93
-# Log odds of a sheet over a solid: the logarithms of its thickness as the network sees it, over the
-# root of its area, and of the spread of its normals. By logistic regression on 150 made cut-outs
-# and 200 made solids; 0.7 less than there, so that hardly a solid is taken for a sheet.
-FLATNESS = (-2.71, -3.25, -12.6)
-RECTANGLE = 1.5  # log odds, of an outline that is one in perspective
+# Log odds of a sheet over a solid, as the network says, from which a thing is flat. A solid that is
+# taken for a sheet loses 4 dB when it turns; a sheet that is left free is only puffed.
+FLAT = 2.0
+SIDED = 2.0  # more, where a box shows two sides: no sheet does
+RECTANGLE = 1.0  # more, of an outline that is one in perspective
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
 EXPLAINED = 0.95  # weight, from which no other shape is tried
 STANDS, LYING = 0.5, 0.5  # weight of a shape that shows what is up, and cosine to the upright
@@ -168,12 +165,15 @@ def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:
     if kind != "auto":
         found = _sheet(evidence) if kind == "flat" else _solid(kind, evidence)
         return replace(found, weight=1.0)
-    sheet, box = _sheet(evidence), _solid("box", evidence)
-    # No sheet shows two sides.
-    if sheet.weight >= FLAT and not _shows_sides(box):
-        return sheet
-    if _shows_sides(box) and box.weight > EXPLAINED:
-        return box
+    odds = seen.flatness + (RECTANGLE if evidence.is_four_cornered else 0.0) - FLAT
+    if odds >= SIDED:
+        return _sheet(evidence)
+    box = _solid("box", evidence)
+    if _shows_sides(box):
+        if box.weight > EXPLAINED:
+            return box
+    elif odds >= 0:
+        return _sheet(evidence)
     best = min(box, _solid("round", evidence), key=_length)
     return best if best.weight >= LEAST else None
 
@@ -184,13 +184,7 @@ def _length(found: Recognised) -> float:
 
 def _sheet(evidence: Evidence) -> Recognised:
     plane, misfit = fit_flat(evidence)
-    depth = float(np.median(evidence.depth[evidence.sure]))
-    size = float(np.sqrt(evidence.mask.sum())) * evidence.grid.step * depth
-    thick = max(float(np.median(evidence.thick[evidence.sure])) / size, 1e-3)
-    spread = max(1 - float(np.linalg.norm(evidence.normal[evidence.sure].mean(0))), 1e-4)
-    odds = FLATNESS[0] * np.log(thick) + FLATNESS[1] * np.log(spread) + FLATNESS[2]
-    odds += RECTANGLE if evidence.is_four_cornered else 0.0
-    return Recognised("flat", misfit, _believed(-float(odds)), evidence, None, plane)
+    return Recognised("flat", misfit, 1.0, evidence, None, plane)
 
 
 def _solid(kind: str, evidence: Evidence) -> Recognised:

@@ -248,7 +248,7 @@ def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfi
     def cost(numbers: F64) -> float:
         profile = built(numbers)
         if profile is None:
-            return HOPELESS
+            return np.inf
         return evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
 
     steps = np.array([0.15, 0.04, 0.03 * (lathe.high - lathe.low)])

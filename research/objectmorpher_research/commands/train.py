@@ -317,6 +317,7 @@ def _train_rods(options: argparse.Namespace) -> None:
 def _train_shape(options: argparse.Namespace) -> None:
     """Makes samples, trains, measures, and writes weights and figures."""
     _check_installed()
+    from ..training import flatness
     from ..training.export_shape import export, weights_of
     from ..training.shape_net import ShapeNet
     from ..training.shapes.families import FAMILIES
@@ -345,6 +346,9 @@ def _train_shape(options: argparse.Namespace) -> None:
     net = trained(checkpoint)
     if options.start is not None and options.blend < 1:
         net = blended(net, weights_of(options.start, ShapeNet()), options.blend)
+    with progress_bar("what is flat") as progress:
+        files = sorted((options.folder / "samples").glob("*.npz"))
+        flatness.fit(net.flat, flatness.samples_of(files, progress))
     found = {**figures(checkpoint, net), "blend": options.blend}
     weights = options.output or options.folder / "shape.onnx"
     found["sha256"] = export(net, weights)

@@ -15,12 +15,14 @@ from objectmorpher_core.lift.crop import SIDE
 from .shape_net import GRID, PLANES, WIDTH, ShapeNet
 
 OPSET = 17
-INPUTS, OUTPUT = ("planes", "tokens"), "shape"
+INPUTS, OUTPUTS = ("planes", "tokens"), ("shape", "flat")
+MASK = 3  # the plane of the mask
 # Ends of the names of a weight's whole numbers, of what one of them is worth in each channel, and
 # of the same numbers where they are read.
 WHOLE, STEP, WIDE = ".whole", ".step", ".wide"
 MOST = 127  # the largest of them
 CLIPPED = np.linspace(0.6, 1.0, 9)  # x a channel's largest weight, from which it may be cut off
+FLAT = "flat."  # begins the names of the weights that say whether a thing is flat
 HALF = ".half"  # ends the name of a weight that an earlier version kept in half precision
 
 
@@ -32,7 +34,18 @@ def export(net: ShapeNet, path: Path) -> str:
     be joined, as normalisations into convolutions, onnxruntime joins when it opens it.
     """
     inputs = (torch.zeros(1, PLANES, SIDE, SIDE), torch.zeros(1, WIDTH, GRID, GRID))
-    return write_onnx(net, inputs, path, INPUTS, (OUTPUT,))
+    whole = _Whole()
+    whole.load_state_dict(net.state_dict())
+    return write_onnx(whole, inputs, path, INPUTS, OUTPUTS)
+
+
+class _Whole(ShapeNet):
+    """With the log odds (n,) that the object is flat beside the surfaces."""
+
+    def forward(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, planes: Tensor, tokens: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        return super().forward(planes, tokens), self.flat(planes[:, MASK : MASK + 1], tokens)
 
 
 def write_onnx(
@@ -95,7 +108,8 @@ def in_bytes(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def weights_of(path: Path, net: ShapeNet) -> dict[str, torch.Tensor]:
     """The weights in a file that `export` wrote, as `net.state_dict()` names them.
 
-    Raises ValueError for weights of another network.
+    What an earlier version did not have, whether a thing is flat, stays as `net` has it. Raises
+    ValueError for weights of another network.
     """
     import onnx
     from onnx import numpy_helper
@@ -110,6 +124,8 @@ def weights_of(path: Path, net: ShapeNet) -> dict[str, torch.Tensor]:
     state = dict(net.state_dict())
     for name, value in state.items():
         if not value.is_floating_point():  # how many batches a normalisation has seen
+            continue
+        if name.startswith(FLAT) and name not in kept:
             continue
         if name not in kept or kept[name].shape != tuple(value.shape):
             raise ValueError(f"{path} holds weights of another network: {name} is not as here")

@@ -10,8 +10,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-GRID = 16  # tokens across
-WIDTH = 768  # of a token: two inner layers of DINOv2 ViT-S/14
+from .flatness import GRID as GRID  # tokens across
+from .flatness import WIDTH as WIDTH  # of a token: two inner layers of DINOv2 ViT-S/14
+from .flatness import FlatNet
+
 PLANES = 7  # red, green, blue, mask, distance to the outline, and the ray's two tangents
 OUTPUTS = 9  # front, thickness, depth, normal (3), edge, spread of front, spread of depth
 CHANNELS = (24, 48, 96, 160)  # from half the size to a sixteenth
@@ -72,6 +74,7 @@ class ShapeNet(nn.Module):
         self.up2 = nn.Sequential(_conv(128 + b, 64), ResidualBlock(64))
         self.up1 = _conv(64 + a, FINE)
         self.head = nn.Conv2d(FINE, 4 * OUTPUTS, 1)  # of four pixels each (Shi et al. 2016)
+        self.flat = FlatNet()  # trained by itself: `flatness.fit`
 
     def forward(
         self, planes: Tensor, tokens: Tensor, phase: tuple[int, int] | None = None

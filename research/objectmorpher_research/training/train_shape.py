@@ -21,7 +21,9 @@ import torch
 from torch import Tensor
 
 from objectmorpher_core.base.progress import Progress, silent
+from objectmorpher_core.lift.shapes.recognition import FLAT
 
+from . import flatness
 from .export_shape import weights_of
 from .shape_data import SHARD, Batch, batch_of, batches, write_shards
 from .shape_eval import ShapeError, Surfaces, learned, relief, score, surfaces_of, true_surfaces
@@ -276,7 +278,8 @@ def blended(net: ShapeNet, start: dict[str, Tensor], share: float) -> ShapeNet:
 def figures(checkpoint: Path, net: ShapeNet) -> dict[str, Any]:
     """Scores on samples that were never trained on, by family and in all, and the curve."""
     kept = torch.load(checkpoint, map_location="cpu", weights_only=True)
-    scores = check(net, sorted((checkpoint.parent / "unseen").glob("*.npz")))
+    unseen = sorted((checkpoint.parent / "unseen").glob("*.npz"))
+    scores = check(net, unseen)
     families = sorted({family for family, _ in scores})
     everything = [row for _, row in scores]
     history = kept["history"]
@@ -285,6 +288,7 @@ def figures(checkpoint: Path, net: ShapeNet) -> dict[str, Any]:
         "plan": json.loads(kept["plan"]),
         "steps": kept["step"],
         "parameters": sum(p.numel() for p in net.parameters()),
+        "flat": flatness.found(net.flat, flatness.samples_of(unseen), FLAT),
         "means": _middles(everything, np.mean),
         "medians": _middles(everything, np.median),
         "families": {

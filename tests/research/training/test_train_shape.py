@@ -131,9 +131,11 @@ def test_it_runs_without_torch(arrays, tmp_path):
     batch = batch_of(arrays)
     session = open_session(path)
     inputs = {"planes": batch.planes[:1].numpy(), "tokens": batch.tokens[:1].numpy()}
-    found = session.run(None, inputs)[0]
+    found, flat = session.run(None, inputs)
     with torch.inference_mode():
         expected = net(batch.planes[:1], batch.tokens[:1]).numpy()
+        odds = net.flat(batch.mask[:1], batch.tokens[:1]).numpy()
+    assert np.abs(flat - odds).max() < 0.02
     assert found.shape[1] == OUTPUTS
     assert np.abs(found - expected).mean() < 2e-3 * max(1.0, np.abs(expected).mean())
 
@@ -197,6 +199,7 @@ def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, ca
     for name, first, times in sets:
         (tmp_path / name).mkdir(exist_ok=True)
         several = {key: np.concatenate([array] * times) for key, array in arrays.items()}
+        several["family"] = np.array(["boxes", "prints"] * (2 * times))
         np.savez(tmp_path / name / f"{first:08d}.npz", **several)
     monkeypatch.setattr(train_shape, "CHECKED", COUNT)
     words = ["train", "shape", "--folder", str(tmp_path)]

@@ -98,7 +98,8 @@ KINDS = {"box": "box", "leaf": "flat"}  # the others are round
 
 @cache
 def seen_of(name: str) -> tuple[SeenShape, Surfaces]:
-    return see(MADE[name]())
+    seen, true = see(MADE[name]())
+    return replace(seen, flatness=4.0 if KINDS.get(name) == "flat" else -4.0), true
 
 
 def see(mesh: Mesh) -> tuple[SeenShape, Surfaces]:

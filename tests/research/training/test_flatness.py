@@ -1,0 +1,87 @@
+"""What is flat is learned from tokens, and seen of things that were never trained on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs torch")
+
+from objectmorpher_core.lift.crop import SIDE, Crop  # noqa: E402
+from objectmorpher_core.lift.relief.shape_look import ShapeModel  # noqa: E402
+from objectmorpher_core.lift.shapes import recognised  # noqa: E402
+from objectmorpher_core.models import registry  # noqa: E402
+from objectmorpher_research.training import flatness  # noqa: E402
+from objectmorpher_research.training.flatness import GRID, WIDTH, FlatNet, FlatSamples  # noqa: E402
+from objectmorpher_research.training.shapes.sample import Sample, make_sample  # noqa: E402
+
+ROUND = ("creatures", "figures", "busts", "lathe", "rings", "superquadrics")
+
+
+class Kinds(NamedTuple):
+    """How many are flat, and how many of the others."""
+
+    flat: int
+    others: int
+
+
+def test_only_tokens_within_the_mask_count():
+    rng = np.random.default_rng(0)
+    tokens = torch.from_numpy(rng.normal(size=(1, WIDTH, GRID, GRID)).astype(np.float32))
+    mask = torch.zeros(1, 1, SIDE, SIDE)
+    mask[..., 28:70, 42:98] = 1
+    found = flatness.pooled(mask, tokens)[0].numpy()
+    own = tokens[0, :, 2:5, 3:7].numpy().reshape(WIDTH, -1)
+    assert np.abs(found - np.concatenate([own.mean(1), own.std(1)])).max() < 1e-4
+    tokens[..., 10:, :] = 9
+    assert np.array_equal(flatness.pooled(mask, tokens)[0].numpy(), found)
+
+
+def test_it_learns_what_tells_both_kinds_apart():
+    def made(seed: int) -> FlatSamples:
+        rng = np.random.default_rng(seed)
+        is_flat = torch.from_numpy((rng.random(400) < 0.4).astype(np.float32))
+        seen = torch.from_numpy(rng.normal(size=(400, 2, 2 * WIDTH)).astype(np.float32))
+        seen[:, :, :40] += 1.5 * is_flat[:, None, None]
+        return FlatSamples(seen, is_flat)
+
+    net, again, other = FlatNet(), FlatNet(), made(1)
+    for each in (net, again):
+        flatness.fit(each, made(0))
+    assert all(torch.equal(a, b) for a, b in zip(net.parameters(), again.parameters(), strict=True))
+    found = flatness.found(net, other, 0.0)
+    assert found["found"] > 0.95 * found["flat"] and found["mistaken"] < 0.05 * found["solid"]
+    with pytest.raises(ValueError, match="too few"):
+        flatness.fit(net, FlatSamples(other.seen, torch.ones(400)))
+
+
+@pytest.fixture(scope="module")
+def shipped() -> ShapeModel:
+    return ShapeModel(registry.shape_network())
+
+
+def test_flat_things_are_seen_to_be_flat_and_round_ones_are_not(networks, shipped):
+    """Of 24 prints and 24 round things that no network was trained on."""
+
+    def count(first: int, families: tuple[str, ...]) -> int:
+        made = [make_sample(first + k, families=families) for k in range(24)]
+        kinds = [_kind(shipped, sample) for sample in made]
+        return kinds.count("flat")
+
+    found = Kinds(count(90_000_000, ("prints",)), count(91_000_000, ROUND))
+    assert found.flat >= 17 and found.others == 0, found
+
+
+def test_where_no_shape_fits_at_all_it_is_free(networks, shipped):
+    """Of a thin chair every surface of revolution is farther off than none."""
+    families = (*ROUND[:4], "boxes", "furniture", "rings", "vehicles", "superquadrics",
+                "extrusions")  # fmt: skip
+    assert _kind(shipped, make_sample(71_000_329, families=families)) == "free"
+
+
+def _kind(network: ShapeModel, sample: Sample) -> str:
+    seen = network.look(sample.rgb, sample.mask, Crop(0, 0, SIDE, sample.tangents))
+    found = recognised(seen)
+    return "free" if found is None else found.kind
