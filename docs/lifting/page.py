@@ -23,13 +23,14 @@ Made by `python docs/lifting/make_lifting.py`, which takes half an hour: every t
 
 The embedded lifter (`--lift relief`) makes a closed shape from one silhouette and from what our
 [shape network](../shape_network/README.md) sees inside it. Then it tries to explain what it sees by
-a few plain shapes: a flat sheet, a box, an ellipsoid, a ring, a surface of revolution whose profile
-is read off the outline. The one that describes the object in the fewest words takes the place of
-the network's surface as far as it explains it, rights how the whole leans, and gives the far side
-that no photo shows; where none does, the shape stays free. An outline that is mostly one ellipse is
-the rim of a plate or a bowl, and a second, nearer circle is the lip of a cup; where the far half of
-what the ellipse encloses is steep, it is the hole of a ring seen aslant. A handle lies in a plane
-through the axis of what it is on. `--shape`, or Kind in the Shape panel, overrules all that.
+a few plain shapes: a box, an ellipsoid, a ring, a surface of revolution whose profile is read off
+the outline. The one that describes the object in the fewest words takes the place of the network's
+surface as far as it explains it, rights how the whole leans, and gives the far side that no photo
+shows; where none does, the shape stays free. Whether the object is a flat sheet the network says
+outright. An outline that is mostly one ellipse is the rim of a plate or a bowl, and a second,
+nearer circle is the lip of a cup; where the far half of what the ellipse encloses is steep, it is
+the hole of a ring seen aslant. A handle lies in a plane through the axis of what it is on.
+`--shape`, or Kind in the Shape panel, overrules all that.
 
 How much of the truth is that? Solids whose every view is known are drawn into a photo (512 px, 50
 degrees of view, over a blurred picture, seen from 6 to 18 degrees above, the ring from 50), lifted

@@ -18,6 +18,7 @@ import numpy as np
 
 from objectmorpher_core.lift.crop import Crop
 from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeModel
+from objectmorpher_core.lift.shapes.recognition import FLAT
 from objectmorpher_core.models import registry
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
 
@@ -38,13 +39,13 @@ A silhouette cannot tell a box from a ball. This network looks at what is inside
 of a photo about an object, its mask, and DINOv2's patch tokens of the crop it states, for each of
 224 x 224 pixels, how near the front is, how far away the ray leaves the part that is seen and the
 whole object, the normal, whether the surface ends there before a farther part, and how far off all
-that is expected to be. The lifter joins it with the silhouette's own body, each as far as it is
-sure (`--trust`, or Trust in the Shape panel; at 0 the silhouette alone gives the shape, as it does
-where DINOv2's weights are not there).
+that is expected to be; and of the whole object, whether it is flat. The lifter joins it with the
+silhouette's own body, each as far as it is sure (`--trust`, or Trust in the Shape panel; at 0 the
+silhouette alone gives the shape, as it does where DINOv2's weights are not there).
 
 - **What it is**: a U-Net of {parameters:.1f} million parameters,
-  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in half precision, of 6 binary
-  digits), SHA-256 `{sha256}`.
+  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in bytes, with a step for
+  each channel: its front is 0.7 % of its spread off), SHA-256 `{sha256}`.
 - **Licence**: Apache-2.0 as the program. It was trained from nothing on pictures that the program
   draws itself; nobody's weights are in it. At work it reads DINOv2 ViT-S/14's tokens (Apache-2.0),
   and looks at each object twice, once mirrored: the mean of both is used.
@@ -57,9 +58,9 @@ where DINOv2's weights are not there).
 ## What it has seen
 
 {samples} made-up objects of twelve families: creatures, figures, busts, lathe work, boxes,
-furniture, rings and tubes, plants, vehicles, sheets and cloth, superquadrics, extrusions. (A
-thirteenth, prints, flat things with a picture on them, is there for the next training.) They are
-signed distances, drawn by sphere tracing
+furniture, rings and tubes, plants, vehicles, sheets and cloth, superquadrics, extrusions. Its
+surfaces have not seen the thirteenth, prints: flat things with a picture on them. They are signed
+distances, drawn by sphere tracing
 (`research/objectmorpher_research/training/shapes`): bevels, holes,
 asymmetry, twists and bends; plain, printed, noisy, striped and photographic materials, matt to
 mirroring; one to three lamps with shadows; fields of view from 20 to 75 degrees, all pitches, often
@@ -89,6 +90,8 @@ By family, the error of the front:
 
 {held_out}
 
+{flat}
+
 How it does on meshes from elsewhere and on photographs stands in [lifting](../lifting/README.md).
 
 ## Limits
@@ -112,8 +115,23 @@ def main() -> None:
         parameters=told["parameters"] / 1e6, size=len(weights) / 1e6, sha256=told["sha256"],
         samples=plan["samples"], passes=plan["passes"], batch=plan["size"], steps=told["steps"],
         means=_means(told), families=_families(told["families"]), held_out=_held_out(),
+        flat=_flat(told["flat"]),
     )  # fmt: skip
     (FOLDER / "README.md").write_text(text, encoding="utf-8")
+
+
+def _flat(told: dict[str, int]) -> str:
+    return f"""## What is flat
+
+Of a print the surfaces see what is printed, and puff that. Whether a thing is flat is said by two
+small layers over the mean and the deviation of its tokens
+(`research/objectmorpher_research/training/flatness.py`), fitted last, in half a minute; here on
+2,528 prints and 4,556 solids among 8,192 other samples, each as it is and mirrored. Of
+{told["flat"]} prints that were never trained on, {told["found"]} are taken for flat, of
+{told["solid"]} other things {told["mistaken"]}. (By the thickness and the normals of the surfaces
+it was 75 of the first 200, and 10 of 420 others.) From which log odds on ({FLAT:g}) was chosen on
+those first 200 and 420, and on sixteen photos: of the last 120 prints 100 are found, of 240 others
+none is mistaken. What is missed is mostly seen edge-on, cut by the frame, or bent."""
 
 
 def _means(told: dict[str, Any]) -> str:

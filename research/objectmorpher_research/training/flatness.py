@@ -106,7 +106,7 @@ def fit(net: FlatNet, samples: FlatSamples, seed: int = 0) -> None:
     Raises ValueError where either kind is missing.
     """
     if len(samples.is_flat.unique()) < 2:
-        raise ValueError("what is flat is learned from prints and solids: there are too few samples")
+        raise ValueError("there are too few samples to learn from what is flat: prints and solids")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         for layer in (net.hidden, net.out):
