@@ -125,13 +125,15 @@ def _flat(told: dict[str, int]) -> str:
 
 Of a print the surfaces see what is printed, and puff that. Whether a thing is flat is said by two
 small layers over the mean and the deviation of its tokens
-(`research/objectmorpher_research/training/flatness.py`), fitted last, in half a minute; here on
-2,528 prints and 4,556 solids among 8,192 other samples, each as it is and mirrored. Of
-{told["flat"]} prints that were never trained on, {told["found"]} are taken for flat, of
-{told["solid"]} other things {told["mistaken"]}. (By the thickness and the normals of the surfaces
-it was 75 of the first 200, and 10 of 420 others.) From which log odds on ({FLAT:g}) was chosen on
-those first 200 and 420, and on sixteen photos: of the last 120 prints 100 are found, of 240 others
-none is mistaken. What is missed is mostly seen edge-on, cut by the frame, or bent."""
+(`research/objectmorpher_research/training/flatness.py`). They are fitted last, in half a minute:
+here on 2,528 prints and 4,556 solids among 8,192 other samples, each as it is and mirrored.
+
+Of {told["flat"]} prints that were never trained on, {told["found"]} are taken for flat, and of
+{told["solid"]} other things {told["mistaken"]}. By the thickness and the normals of the surfaces it
+was 75 of the first 200, and 10 of 420 other things. A thing counts as flat from log odds of
+{FLAT:g}, which was chosen on those first 200 and 420, and on sixteen photos; of the last 120
+prints, on which nothing was chosen, 100 are found, and none of 240 other things is mistaken. What
+is missed is mostly seen edge-on, cut by the frame, or bent."""
 
 
 def _means(told: dict[str, Any]) -> str:

@@ -41,8 +41,8 @@ WHOLE = 0.85  # weight, from which it is nothing but the shape
 # Log odds of a sheet over a solid, as the network says, from which a thing is flat. A solid that is
 # taken for a sheet loses 4 dB when it turns; a sheet that is left free is only puffed.
 FLAT = 2.0
-SIDED = 2.0  # more, where a box shows two sides: no sheet does
-RECTANGLE = 1.0  # more, of an outline that is one in perspective
+SIDED = 2.0  # log odds that are asked on top where a box shows two sides: no sheet does
+RECTANGLE = 1.0  # log odds that an outline adds which is a rectangle in perspective
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
 EXPLAINED = 0.95  # weight, from which no other shape is tried
 STANDS, LYING = 0.5, 0.5  # weight of a shape that shows what is up, and cosine to the upright
