@@ -6,6 +6,7 @@ The heavy modules of the core are imported when the first object is lifted, or b
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,7 @@ POSES = 3  # remembered of each object: as it is, as a stroke has it, as somebod
 CARRIERS = 8  # Gaussians that tell how a place of the photo has moved
 RIDGE = 1e-3  # px^2, where they lie on a line
 OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
+SHARES = 1000  # of what the background shows of its ghosts: a drag goes to and fro between a few
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +81,10 @@ class Derived:
         self._latest = Memo(MOST_SHAPES)  # the last shape of each lift, in a list of one
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
-        self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
+        self._links, self._bodies = Memo(), Memo()
+        self._plates, self._shaded = Memo(), Memo()
         self._carriers, self._invented, self._hidden = Memo(), Memo(), Memo()
         self._ghosts = Memo()
-        self._ghost_shares: tuple[float, ...] = ()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -105,17 +107,19 @@ class Derived:
     def plate(self, document: Document) -> Plate | None:
         """Return the background of the view: the photo around the objects that are still there."""
         from objectmorpher_core.compose.order import holes
-        from objectmorpher_core.compose.plate.plate import plate_of_holes, shaded
+        from objectmorpher_core.compose.plate.plate import plate_of_holes, shaded, shaded_plate
         from objectmorpher_core.compose.plate.residue import shown_shares
 
         gone, ghosts = holes(document), self.ghosts(document)
-        shares = shown_shares(document, ghosts, gone)
-        if shares != self._ghost_shares:  # remembered by identity, as all else is
-            self._ghost_shares = shares
+        shares = _the_same(shown_shares(document, ghosts, gone))
+        is_gone = [share > 0 for share in shares]
+        base = self._shaded(
+            lambda: shaded_plate(document, gone, ghosts, is_gone),
+            document.plate, ghosts, *is_gone, *shaded(document, gone),
+        )  # fmt: skip
         return self._plates(
-            lambda: plate_of_holes(document, gone, ghosts), document.plate,
-            *gone, *(o.mask for o in document.objects), self._ghost_shares,
-            *shaded(document, gone),
+            lambda: plate_of_holes(document, gone, ghosts, base), base,
+            *gone, *(o.mask for o in document.objects), shares,
         )  # fmt: skip
 
     def ghosts(self, document: Document) -> tuple[Ghost, ...]:
@@ -478,6 +482,12 @@ class SurfaceFacts:
         thing = document.objects[k]
         assert thing.lifted is not None
         return self._mirrors(lambda: _find_mirror(document, k), thing.lifted)
+
+
+@lru_cache(SHARES)
+def _the_same(shares: tuple[float, ...]) -> tuple[float, ...]:
+    """Return one tuple for equal ones: what comes from it is remembered by identity."""
+    return shares
 
 
 def _find_mirror(document: Document, k: int) -> MirrorPlane:

@@ -31,7 +31,7 @@ NOTHING, OPAQUE = np.uint32(0), np.uint32(255 << 24)
 def flatten(
     photo: U8, back: U8, blend: F32, layers: tuple[CanvasLayer, ...], photo_box: Bounds
 ) -> U8:
-    """(h, w, 4) of the canvas, its rows from the bottom up as OpenGL has them.
+    """(h, w, 4) of the canvas, upright.
 
     `photo`, `back` (h, w, 4): the photo and the edit's background as the view shows them; `blend`
     see `Scene`; `photo_box`: canvas px, beyond which there is no object.
@@ -58,7 +58,7 @@ def rehearse() -> None:
 
 
 def _add(layer: CanvasLayer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
-    """Draws a layer over what is there; upside down like the rest."""
+    """Draws a layer over what is there."""
     low = [max(a, b, 0.0) for a, b in zip(layer.box[:2], photo_box[:2], strict=True)]
     size = out.shape[1], out.shape[0]
     high = [min(a, b, c) for a, b, c in zip(layer.box[2:], photo_box[2:], size, strict=True)]
@@ -127,11 +127,11 @@ def _room(blend):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
 def _mix(first, last, photo, back, blend, out):
     """Rows first..last of the background: the photo, and where the edit is shown what is behind."""
-    height, width = out.shape
+    width = out.shape[1]
     cells, row = _room(blend)
     for y in range(first, last):
         _blend_row(blend, y, cells, row)
-        share, above, below, to = row[CELL // 2 :], photo[y], back[y], out[height - 1 - y]
+        share, above, below, to = row[CELL // 2 :], photo[y], back[y], out[y]
         for x in range(np.uint64(width)):
             a, b, e = above[x], below[x], share[x]
             to[x] = _packed(
@@ -148,7 +148,7 @@ def _add_exact(first, last, left, top, pixels, skipped, above, width, gain, blen
     for line in range(first, last):
         y = top + line
         _blend_row(blend, y, cells, row)
-        share, to = row[CELL // 2 + left :], out[len(out) - 1 - y, left:]
+        share, to = row[CELL // 2 + left :], out[y, left:]
         layer = pixels[above + line, skipped:]
         for x in range(np.uint64(width)):
             p = layer[x]
@@ -163,7 +163,7 @@ def _add_coarse(first, last, left, top, pixels, xs, x_shares, ys, y_shares, gain
     for line in range(first, last):
         y = top + line
         _blend_row(blend, y, cells, row)
-        share, to = row[CELL // 2 + left :], out[len(out) - 1 - y, left:]
+        share, to = row[CELL // 2 + left :], out[y, left:]
         i, t = ys[line], y_shares[line]
         below = min(i + 1, most_y)
         for x in range(len(xs)):

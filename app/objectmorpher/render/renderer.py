@@ -19,6 +19,7 @@ from ..editor.view import ViewState
 from .gpu_memory import BlendTexture, PictureTexture
 from .layer_pass import DefocusPass, LayerPass, photo_box
 from .photo_pass import PhotoPass
+from .row_copy import RowCopy
 from .scene import Colour, Scene, SplatObject
 from .shaders import Programs
 
@@ -41,7 +42,7 @@ class StillView:
         self._pictures: dict[str, tuple[Scene, U8]] = {}  # with what they were drawn from
 
     def flat(self, scene: Scene, view: ViewState, place: Place, draw: Draw) -> U8 | None:
-        """The canvas, its rows from the bottom up; None where the shaders have to draw it.
+        """The canvas, upright; None where the shaders have to draw it.
 
         That is when the view moves, and where the scene is more than an edited photo. `draw`
         makes a picture by the shaders.
@@ -88,13 +89,15 @@ Place: TypeAlias = tuple[Any, ...]  # where the canvas is, what part of the pict
 class KeptCanvas:
     """A framebuffer as large as the window."""
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
+    def __init__(self, context: moderngl.Context, rows: RowCopy | None = None) -> None:
+        """`rows`: see there; None where OpenGL is not emulated."""
+        self._context, self._rows = context, rows
         self._size = (0, 0)
         self._color: moderngl.Texture | None = None
         self.buffer: moderngl.Framebuffer | None = None
         self._scene: Scene | None = None  # what it shows, and how
         self._place: Place = ()
+        self._is_upright = False  # its rows are from the top down
 
     def shows(self, scene: Scene, place: Place) -> bool:
         """Whether it shows this already."""
@@ -107,14 +110,45 @@ class KeptCanvas:
         if self.buffer is None or size != self._size:
             self.forget()
             self._size, self._color = size, self._context.texture(size, 4)
+            if self._rows is not None:
+                self._rows.make_alike(self._color)
             self.buffer = self._context.framebuffer([self._color])
         self.buffer.clear(*surround, 1.0)
+        self._is_upright = False
         return self.buffer
 
-    def write(self, pixels: U8, viewport: tuple[int, int, int, int]) -> None:
-        """A picture of the canvas (h, w, 4), bottom row first, in place of what it shows there."""
-        assert self._color is not None
-        self._color.write(pixels, viewport=viewport)
+    def write(self, pixels: U8, viewport: Viewport, surround: Colour, is_sampled: bool) -> None:
+        """A picture of the canvas (h, w, 4), upright, in place of what it shows there.
+
+        `is_sampled`: shaders will read it, which know it from the bottom up.
+        """
+        assert self._color is not None and self.buffer is not None
+        is_upright = self._rows is not None and not is_sampled
+        if is_upright is not self._is_upright:
+            self.buffer.clear(*surround, 1.0)
+            self._is_upright = is_upright
+        left, row, width, height = viewport
+        if is_upright:
+            row = self._size[1] - row - height
+        else:
+            pixels = np.ascontiguousarray(pixels[::-1])
+        self._color.write(pixels, viewport=(left, row, width, height))
+
+    def copy_to(self, target: moderngl.Framebuffer) -> None:
+        """Show all of it in the window."""
+        assert self.buffer is not None
+        if self._is_upright and self._rows is not None:
+            self._rows.copy_upright(self.buffer, target, self._size)
+        else:
+            self._context.copy_framebuffer(target, self.buffer)
+
+    def read_pixel(self, left: int, bottom: int) -> tuple[int, int, int]:
+        """Read a pixel, u8; black before there is any."""
+        if self.buffer is None:
+            return 0, 0, 0
+        row = self._size[1] - 1 - bottom if self._is_upright else bottom
+        data = self.buffer.read(viewport=(left, row, 1, 1), components=3, alignment=1)
+        return data[0], data[1], data[2]
 
     def forget(self) -> None:
         """Forget everything."""
@@ -191,7 +225,8 @@ class Renderer:
         self._splat_pass: SplatPass | None = None
         self._screen_pass = ScreenPass(context)
         self.table: U8 | None = None  # the photo's colours on this screen, see `screen_table`
-        self._kept, self._still = KeptCanvas(context), StillView()
+        rows = RowCopy.found() if self._is_emulated else None
+        self._kept, self._still = KeptCanvas(context, rows), StillView()
         self._target = context.screen
         self._surround: Colour = (0.0, 0.0, 0.0)
         self._size = (1, 1)
@@ -217,17 +252,18 @@ class Renderer:
     def draw(self, scene: Scene, view: ViewState, viewport: Viewport) -> None:
         """The whole window: the scene in `viewport`, its colour around it."""
         kept = self._kept
-        place = (self._surround, self._size, viewport, view.place, view.scale)
+        is_sampled = self.table is not None
+        place = (self._surround, self._size, viewport, view.place, view.scale, is_sampled)
         if not kept.shows(scene, place):
             if (flat := self._flat(scene, view, viewport, place)) is not None:
-                kept.write(flat, viewport)
+                kept.write(flat, viewport, self._surround, is_sampled)
             else:
                 self._target = kept.begin(self._size, self._surround)
                 self._draw(scene, view, viewport)
                 self._target = self._context.screen
-        assert kept.buffer is not None
-        self._context.copy_framebuffer(self._target, kept.buffer)
+        kept.copy_to(self._target)
         if self.table is not None:
+            assert kept.buffer is not None
             self._use(viewport)
             self._screen_pass.draw(kept.buffer, self.table, _part(viewport, photo_box(scene, view)))
         self._use(viewport)
@@ -295,10 +331,7 @@ class Renderer:
 
     def read_pixel(self, left: int, bottom: int) -> tuple[int, int, int]:
         """Read one of the canvas's pixels, u8, as it is before the screen's colours."""
-        if self._kept.buffer is None:
-            return 0, 0, 0
-        data = self._kept.buffer.read(viewport=(left, bottom, 1, 1), components=3, alignment=1)
-        return data[0], data[1], data[2]
+        return self._kept.read_pixel(left, bottom)
 
     def _use(self, viewport: Viewport) -> None:
         self._target.use()

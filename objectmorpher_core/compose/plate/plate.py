@@ -9,6 +9,7 @@ object was.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -194,22 +195,23 @@ def _enlarged(small: F32, shape: tuple[int, ...]) -> F32:
 
 
 def plate_of_holes(
-    document: Document, holes: tuple[Matte, ...], ghosts: tuple[Ghost, ...] | None = None
+    document: Document,
+    holes: tuple[Matte, ...],
+    ghosts: tuple[Ghost, ...] | None = None,
+    base: Plate | None = None,
 ) -> Plate | None:
     """The document's plate, invented only where what stood in these `holes` is gone.
 
     Around objects that are still there it is the photo, except where it was repaired by hand.
-    `ghosts` saves finding them again.
+    `ghosts` saves finding them again, and `base`, see `shaded_plate`, most of the rest.
     """
-    plate, margin = document.plate, hole_margin(*document.photo.size)
+    margin = hole_margin(*document.photo.size)
     near = SEAM * margin
     ghosts = find_ghosts(document, near) if ghosts is None else ghosts
-    if plate is not None and ghosts:
-        shares = shown_shares(document, ghosts, holes)
+    shares = shown_shares(document, ghosts, holes)
+    plate = base or shaded_plate(document, holes, ghosts, [share > 0 for share in shares])
+    if plate is not None:
         plate = with_ghosts(plate, document.photo.pixels, ghosts, shares)
-    still = shaded(document, holes)
-    if plate is not None and still:
-        plate = _in_shade(plate, document.photo.pixels, still, margin)
     there = [o for o in document.objects if o.mask is not None and not o.is_visitor]
     rest = [o for o in there if o.matte not in holes]
     if plate is None or not rest:
@@ -228,6 +230,22 @@ def plate_of_holes(
     x0, y0, x1, y1 = plate.box
     pixels = np.where(hole[..., None], plate.pixels, document.photo.pixels[y0:y1, x0:x1])
     return replace(plate, pixels=pixels, hole=hole, painted=painted)
+
+
+def shaded_plate(
+    document: Document, holes: tuple[Matte, ...], ghosts: tuple[Ghost, ...], is_gone: Sequence[bool]
+) -> Plate | None:
+    """Return the plate without the ghosts that are gone, in the shade that lies behind the objects.
+
+    That stays the same for most of a drag, however much of each ghost is gone.
+    """
+    plate, still = document.plate, shaded(document, holes)
+    if plate is None:
+        return None
+    plate = with_ghosts(plate, document.photo.pixels, ghosts, [float(gone) for gone in is_gone])
+    if not still:
+        return plate
+    return _in_shade(plate, document.photo.pixels, still, hole_margin(*document.photo.size))
 
 
 def shaded(document: Document, holes: tuple[Matte, ...]) -> tuple[Matte, ...]:

@@ -9,10 +9,19 @@ import numpy as np
 import pytest
 from skimage import data
 
+from objectmorpher.canvas.derived import Derived
 from objectmorpher_core import compose
 from objectmorpher_core.base.arrays import F32, Mask, Pixels
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.plate.plate import SEAM, build_plate, hole_margin, plate_crop
+from objectmorpher_core.compose.order import holes
+from objectmorpher_core.compose.plate import plate as plates
+from objectmorpher_core.compose.plate.plate import (
+    SEAM,
+    build_plate,
+    hole_margin,
+    plate_crop,
+    plate_of_holes,
+)
 from objectmorpher_core.compose.plate.residue import find_ghosts, left_out, with_parts
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
@@ -142,6 +151,25 @@ def test_a_ghost_goes_with_what_stands_beside_it(footless: Document):
     assert left(away) < 0.4 * unlike
     near = edits.set_placement(footless, 0, Placement(move=(0.0, -0.3)))
     assert left(near) > 0.9 * unlike, "what hardly moved leaves its foot where it is"
+
+
+def test_a_drag_computes_the_shade_behind_an_object_once(footless, monkeypatch):
+    """The window asks for every frame's background, from which other parts of ghosts are gone."""
+    derived, made = Derived(), []
+    inner = plates._in_shade
+    monkeypatch.setattr(plates, "_in_shade", lambda *a: made.append(1) or inner(*a))
+    shown = set()
+    for place in (*range(4, 40, 3), *range(40, 4, -3)):
+        turned = edits.set_placement(footless, 0, Placement(turn=(place, 0.0, 0.0)))
+        plate = derived.plate(turned)
+        assert plate is not None
+        shown.add(id(plate))
+        count = len(made)
+        whole = plate_of_holes(turned, holes(turned))
+        del made[count:]
+        assert whole is not None
+        assert np.array_equal(plate.pixels, whole.pixels) and np.array_equal(plate.hole, whole.hole)
+    assert len(shown) > 1 and len(made) <= 2
 
 
 def test_what_a_turn_uncovers_lies_in_the_shadow_that_is_left_beside_it():

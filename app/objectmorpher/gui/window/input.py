@@ -222,18 +222,25 @@ class Input:
         self.crosshair, self.focus = Crosshair(), KeyboardFocus()
         self._waiting: list[tuple[int, str]] = []  # ImGui's number of the event, and the chord
         self._pressed: list[str] = []  # chords since the last frame, in their order
-        self._mouse = 0.0, 0.0  # where it was last, window units
+        self.mouse = 0.0, 0.0  # where it was last, window units
         self._last: tuple[float, float] | None = None
         self._has_popup = False  # in the last frame
         self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
 
-    def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
-        """`rect`: the canvas, window units; `ratio`: canvas px per window unit."""
+    def update(
+        self, editor: Editor, rect: Rect, ratio: float, at: tuple[float, float] | None = None
+    ) -> None:
+        """`rect`: the canvas, window units; `ratio`: canvas px per window unit.
+
+        `at`: where the mouse is by now, if not where ImGui's frame began, window units.
+        """
         io = imgui.get_io()
         has_mouse = imgui.is_mouse_pos_valid()  # else it has left, and is at minus 3e38
-        if has_mouse:
-            self._mouse = io.mouse_pos.x, io.mouse_pos.y
-        x, y = self._mouse
+        if at is not None:
+            self.mouse = at
+        elif has_mouse:
+            self.mouse = io.mouse_pos.x, io.mouse_pos.y
+        x, y = self.mouse
         is_mouse_used = any(io.mouse_down) or io.mouse_wheel != 0
         self.crosshair.follow_mouse((x, y), is_mouse_used)
         if editor.document is None:

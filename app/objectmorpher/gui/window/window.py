@@ -150,8 +150,7 @@ class Window:
                 break
             glfw.swap_buffers(self._handle)
             if self._frame_log is not None:
-                mouse = imgui.get_io().mouse_pos
-                self._frame_log.end(self.editor, (mouse.x, mouse.y))
+                self._frame_log.end(self.editor, self._input.mouse)
             if drawn == 1:
                 self._open_first()
         if self._frame_log is not None:
@@ -221,7 +220,9 @@ class Window:
         imgui.new_frame()
         layout = self._lay_out()
         self._resize_canvas(layout.canvas, ratio)
-        self._input.update(self.editor, layout.canvas, ratio)
+        is_held = self.editor.hand.is_busy  # the panels wait for the hand: they are drawn first
+        if not is_held:
+            self._input.update(self.editor, layout.canvas, ratio)
         layout = self._lay_out()
         draw_menu(self.editor, layout.menu)
         if layout.tabs.height:
@@ -231,6 +232,10 @@ class Window:
         else:
             draw_toolbar(self.editor, layout.strip)
             draw_inspector(self.editor, layout.inspector)
+        if is_held:  # with the newest place of the pointer
+            glfw.poll_events()
+            self._input.update(self.editor, layout.canvas, ratio, self._size.held_pointer())
+        if self.editor.document is not None:
             draw_overlays(self.editor, layout.canvas, ratio)
             self._input.crosshair.draw(self.editor, layout.canvas, ratio)
         draw_status(self.editor, layout.status, self._input.hint(self.editor))
@@ -466,6 +471,15 @@ class WindowSize:
             glfw.get_mouse_button(self._handle, button) for button in BUTTONS
         ):  # to ImGui it is nowhere, but a stroke goes on there
             io.add_mouse_pos_event(*glfw.get_cursor_pos(self._handle))
+
+    def held_pointer(self) -> tuple[float, float] | None:
+        """Where the pointer is now, window units; None where no button holds it any more.
+
+        The place at which a button went up is ImGui's to report.
+        """
+        if any(glfw.get_mouse_button(self._handle, button) for button in BUTTONS):
+            return glfw.get_cursor_pos(self._handle)
+        return None
 
     def _take_pointer(self, _window: object, is_inside: int) -> None:
         self._is_pointer_inside = bool(is_inside)
