@@ -62,7 +62,7 @@ def test_going_from_tab_to_tab_changes_no_document(tabs: Editor) -> None:
     tabs.tab.source = Path("/photos/other.png")
     kept = {tab: facts(tab) for tab in (first, second, third)}
     way = random.Random(3)
-    for _ in range(30):
+    for _ in range(12):
         if way.random() < 0.5:
             go(tabs, way.choice((first, second, third)))
         else:

@@ -54,14 +54,14 @@ def shipped() -> ShapeModel:
 
 
 def test_flat_things_are_seen_to_be_flat_and_round_ones_are_not(networks, shipped):
-    """Of 24 prints and 24 round things that no network was trained on."""
+    """Of 12 prints and 12 round things that no network was trained on."""
 
     def count(first: int, families: tuple[str, ...]) -> int:
-        made = [make_sample(first + k, families=families) for k in range(24)]
+        made = [make_sample(first + k, families=families) for k in range(12)]
         kinds = [_kind(shipped, sample) for sample in made]
         return kinds.count("flat")
 
-    assert count(90_000_000, ("prints",)) >= 17
+    assert count(90_000_000, ("prints",)) >= 9
     assert count(91_000_000, ROUND) == 0
 
 

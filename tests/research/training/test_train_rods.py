@@ -88,7 +88,7 @@ def test_it_learns_and_runs_without_torch(tmp_path):
         return train_rods.data_of([arrays])
 
     data, other = made(COUNT), made(COUNT)
-    plan = train_rods.RodPlan(steps=150, size=16)
+    plan = train_rods.RodPlan(steps=60, size=16)
     net = RodCommittee([train_rods.learn(data, plan, seed) for seed in (0, 1)]).eval()
     spread = float(np.degrees(UNIT * other.angles[:, 0].numpy().std()))
     off = train_rods.figures(net, other)

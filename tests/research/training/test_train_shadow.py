@@ -99,11 +99,11 @@ def test_it_learns_and_runs_without_torch(drawn, tmp_path):
     state = train_shadow.ShadowState(tmp_path / "shadow.pt", plan)
     rng = np.random.default_rng(0)
     before = state.learn(*ring.drawn(rng, 4))
-    for _ in range(40):
+    for _ in range(20):
         after = state.learn(*ring.drawn(rng, 4))
     assert float(after.shade.detach()) < 0.7 * float(before.shade.detach())
     state.save()
-    assert train_shadow.ShadowState(state.file, plan).step == state.step == 41
+    assert train_shadow.ShadowState(state.file, plan).step == state.step == 21
     net, file = state.trained(), tmp_path / "shadow.onnx"
     train_shadow.export(net, file)
     planes = np.stack([s.planes for s in drawn[:1]])

@@ -28,7 +28,7 @@ PAGE = Path(__file__).parents[4] / "docs" / "lifting" / "README.md"
 AXIS = turn_matrix(0, -15, 3)[:, 1]
 RADIUS = 0.15
 OFF = 0.12  # crop units
-UNSEEN = range(70_000_000, 70_000_032)  # not trained on
+UNSEEN = range(70_000_000, 70_000_016)  # not trained on
 
 
 def _can(radius: float) -> Mesh:
