@@ -112,10 +112,9 @@ class Derived:
 
         gone, ghosts = holes(document), self.ghosts(document)
         shares = _the_same(shown_shares(document, ghosts, gone))
-        is_gone = [share > 0 for share in shares]
         base = self._shaded(
-            lambda: shaded_plate(document, gone, ghosts, is_gone),
-            document.plate, ghosts, *is_gone, *shaded(document, gone),
+            lambda: shaded_plate(document, gone, ghosts),
+            document.plate, ghosts, *gone, *shaded(document, gone),
         )  # fmt: skip
         return self._plates(
             lambda: plate_of_holes(document, gone, ghosts, base), base,

@@ -9,7 +9,6 @@ object was.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -32,6 +31,7 @@ from .residue import (
     tint_of,
     visible_residue,
     with_ghosts,
+    without_ghosts,
 )
 
 HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the object
@@ -208,9 +208,9 @@ def plate_of_holes(
     margin = hole_margin(*document.photo.size)
     near = SEAM * margin
     ghosts = find_ghosts(document, near) if ghosts is None else ghosts
-    shares = shown_shares(document, ghosts, holes)
-    plate = base or shaded_plate(document, holes, ghosts, [share > 0 for share in shares])
+    plate = base or shaded_plate(document, holes, ghosts)
     if plate is not None:
+        shares = shown_shares(document, ghosts, holes)
         plate = with_ghosts(plate, document.photo.pixels, ghosts, shares)
     there = [o for o in document.objects if o.mask is not None and not o.is_visitor]
     rest = [o for o in there if o.matte not in holes]
@@ -233,16 +233,16 @@ def plate_of_holes(
 
 
 def shaded_plate(
-    document: Document, holes: tuple[Matte, ...], ghosts: tuple[Ghost, ...], is_gone: Sequence[bool]
+    document: Document, holes: tuple[Matte, ...], ghosts: tuple[Ghost, ...]
 ) -> Plate | None:
-    """Return the plate without the ghosts that are gone, in the shade that lies behind the objects.
+    """The plate without ghosts, with the shade that goes on behind things that only turned.
 
-    That stays the same for most of a drag, however much of each ghost is gone.
+    It stays the same for a whole drag, however far that has come.
     """
     plate, still = document.plate, shaded(document, holes)
     if plate is None:
         return None
-    plate = with_ghosts(plate, document.photo.pixels, ghosts, [float(gone) for gone in is_gone])
+    plate = without_ghosts(plate, document, ghosts, holes)
     if not still:
         return plate
     return _in_shade(plate, document.photo.pixels, still, hole_margin(*document.photo.size))

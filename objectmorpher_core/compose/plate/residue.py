@@ -281,12 +281,31 @@ def shown_shares(
     for ghost in ghosts:
         item, camera = document.objects[ghost.owner], document.photo.camera
         px = 0.0
-        if any(item.matte is hole for hole in holes):
-            stays = ghost.may_be_shade and keeps_shade(item, document)
+        if has_left(item, holes):
+            stays = _stays(ghost, document)
             px = _moved_by(replace(item, placement=Placement()) if stays else item, camera, ghost)
         share = np.clip((px - MOVED[0]) / (MOVED[1] - MOVED[0]), 0, 1)
         shares.append(float(np.rint(share * STEPS) / STEPS))
     return tuple(shares)
+
+
+def has_left(item: EditObject, holes: Sequence[Matte]) -> bool:
+    """Whether an object is no more where it was in the photo; `holes` as above."""
+    return any(item.matte is hole for hole in holes)
+
+
+def without_ghosts(
+    plate: Plate, document: Document, ghosts: Sequence[Ghost], holes: Sequence[Matte]
+) -> Plate:
+    """The plate without the ghosts that go with what has left, however far that is by now."""
+    photo, objects = document.photo.pixels, document.objects
+    goes = [has_left(objects[g.owner], holes) and not _stays(g, document) for g in ghosts]
+    return with_ghosts(plate, photo, ghosts, [float(each) for each in goes])
+
+
+def _stays(ghost: Ghost, document: Document) -> bool:
+    """Whether it is the shadow of what only turns where it stands."""
+    return ghost.may_be_shade and keeps_shade(document.objects[ghost.owner], document)
 
 
 def _moved_by(item: EditObject, camera: Camera, ghost: Ghost) -> float:
