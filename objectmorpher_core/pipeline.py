@@ -43,7 +43,7 @@ from .lift.beyond_frame import cut_out_beyond
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
 from .lift.registration.other_photo import OtherPhoto, with_photo
 from .lift.relief.depth_look import look_at_all
-from .pictures.image import ImageError, Picture, read_coverage, read_picture, to_u8
+from .pictures.image import ImageError, Picture, naming, read_coverage, read_picture, to_u8
 from .raster.posed import PosedSplats
 from .scripting import runner
 from .scripting.background import PlateAhead
@@ -323,7 +323,8 @@ class _Run:
         """Object `k` as far as it can be without the plate; the document may hold it, lifted."""
         script, is_lifted = wanted.script, k < len(self.document.objects)
         if wanted.duplicate is None and not is_lifted:
-            self.choose(script, mask, part(progress, 0.0, 0.5))
+            with naming(script.mask or "the mask"):
+                self.choose(script, mask, part(progress, 0.0, 0.5))
         if wanted.stay_in_front:
             self._keep(k)
             return
@@ -391,7 +392,8 @@ class _Run:
             progress(0.6, "Cutting out what stays in front")
             k = len(self.document.objects)
             try:
-                self.choose(wanted, mask, silent)
+                with naming(script.front_mask or "the mask"):
+                    self.choose(wanted, mask, silent)
                 self._keep(k)
             except ValueError as error:
                 raise ScriptError(f"front {number}: {error}") from error
@@ -476,7 +478,8 @@ def other_photo(
 
     Raises InputError, ImageError, SelectionError, OSError.
     """
-    opened = open_photo(read_input(path), path.name, fov, seed).photo
+    with naming(path):
+        opened = open_photo(read_input(path), path.name, fov, seed).photo
     prompt = Prompt((Click(*at),)) if at else Prompt(is_subject=True)
     reading = read_photo(opened.pixels, segment.load(backend), part(progress, 0.0, 0.7))
     found = reading.segment(prompt, part(progress, 0.7, 1.0), seed).mask

@@ -7,7 +7,10 @@ byte for byte; only 16-bit pixels that go into a format of 8 bits (`formats.py`)
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -118,6 +121,15 @@ class Picture:
             object.__setattr__(self, "alpha", frozen(self.alpha))
 
 
+@contextmanager
+def naming(file: str | Path) -> Iterator[None]:
+    """Put a file's name before what is wrong with the image in it, where there are several."""
+    try:
+        yield
+    except ImageError as error:
+        raise ImageError(f"{file}: {error}") from error
+
+
 def read_picture(data: bytes, most: int = MAX_PIXELS) -> Picture:
     """The picture in the bytes of an image file; of several frames the first.
 
@@ -140,7 +152,9 @@ def _read(data: bytes, most: int) -> Picture:
     except Exception:  # Pillow raises whatever a broken file makes it stumble over
         image = None  # perhaps a TIFF that only tifffile knows
     if image is None and data[:4] not in tiff.MARKS:
-        raise ImageError("the file is not an image that can be read (PNG, JPEG, TIFF, WebP, AVIF)")
+        raise ImageError(
+            "the file is not an image that can be read (PNG, JPEG, TIFF, WebP, AVIF, BMP, GIF)"
+        )
     if image is not None and image.width * image.height > most:
         allowed = f"{most // 10**6} megapixels" if most >= 10**6 else f"{most:,} px"
         raise ImageError(f"the image is {image.width} x {image.height} px, more than {allowed}")

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import F64
-from ..base.quoting import shown
 from ..deform.puppet import puppet_of
 from ..document import edits
 from ..document.model import Document, EditObject
@@ -101,7 +100,7 @@ def _places(data: bytes) -> dict[int, F64]:
             for thing in told["objects"]
         }
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ScriptError(f"the file of handles cannot be read: {shown(str(error))}") from None
+        raise ScriptError("the file is none of handles as --save-handles writes them") from error
     if not all(np.isfinite(places).all() for places in found.values()):
         raise ScriptError("a place of a handle is not finite")
     return found

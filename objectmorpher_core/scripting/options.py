@@ -94,11 +94,12 @@ def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
 
 def _several(what: str, read: Read, most: int | None = None) -> Read:
     """Read a list of what `read` takes; `what`: they are called."""
-    called = what if most is None else f"at most {most} {what}"
 
     def parse(key: str, value: Any) -> tuple[Any, ...]:
-        if not isinstance(value, list | tuple) or (most is not None and len(value) > most):
-            raise ScriptError(f"{key}: {shown(value)} is not a list of {called}")
+        if not isinstance(value, list | tuple):
+            raise ScriptError(f"{key}: {shown(value)} is not a list of {what}")
+        if most is not None and len(value) > most:
+            raise ScriptError(f"{key}: there are {len(value)} {what}, and at most {most} are taken")
         return tuple(read(key, each) for each in value)
 
     return parse
@@ -436,6 +437,9 @@ def options_of(*parts: str) -> frozenset[str]:
     return frozenset(name for name, option in OPTIONS.items() if option.part in parts)
 
 
+WRITTEN = ("report", "session", "video", "seconds")  # and save-...: options that are no edit's
+
+
 def script_from(options: Mapping[str, Any], dashes: str = "") -> EditScript:
     """A script from long option names without dashes. Raises ScriptError.
 
@@ -444,6 +448,10 @@ def script_from(options: Mapping[str, Any], dashes: str = "") -> EditScript:
     said: dict[str, Any] = {}
     for key, value in options.items():
         name = key.replace("-", "_")
+        if name in WRITTEN or name.startswith("save_"):
+            raise ScriptError(
+                f"{shown(key)} says what is to be written: it stands on the command line, not here"
+            )
         if name not in OPTIONS:
             raise ScriptError(f"there is no option {shown(key)}{meant(name, OPTIONS)}")
         said[name] = OPTIONS[name].values.read(dashes + key, value)

@@ -96,7 +96,7 @@ def build_report(
     }  # fmt: skip
     if len(document.objects) > 1:
         report["objects"] = [
-            {"number": k + 1, "name": item.name, "role": _role(document.objects, k)}
+            {"number": k + 1, "name": item.name, "role": role_of(document.objects, k)}
             | (
                 _of_object(document, k, puppets[k], energies.get(k, (0.0,)))
                 if k in puppets
@@ -107,7 +107,7 @@ def build_report(
     return report
 
 
-def _role(objects: tuple[EditObject, ...], k: int) -> str:
+def role_of(objects: tuple[EditObject, ...], k: int) -> str:
     """What an object is to the edit."""
     item = objects[k]
     if item.lifted is None:

@@ -33,7 +33,7 @@ from ..document.model import (
 )
 from ..document.placement import is_in_place, set_seen_from, spun
 from ..document.settings import DeformSettings, Hint, Shadow
-from ..pictures.image import read_mask
+from ..pictures.image import naming, read_mask
 from ..raster.trust import SIGNS, trust_in
 from .background import LIGHT, LIGHT_LIFTERS, PlateAhead, PlateTask, ShadowCaster
 from .options import FINISH, EditScript, ScriptError, options_of, said_by
@@ -110,7 +110,8 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
     """Return the script's settings of the object's shape. Raises ImageError."""
     hidden = None
     if script.hidden is not None:
-        hidden = read_mask(read_input(Path(script.hidden)), document.photo.size)
+        with naming(script.hidden):
+            hidden = read_mask(read_input(Path(script.hidden)), document.photo.size)
     return LiftSettings(
         count=script.gaussians or GAUSSIANS,
         thickness=script.thickness,
@@ -213,13 +214,22 @@ def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
     for k, puppet in puppets.items():
         item = document.objects[k]
         if item.is_moved and item.is_visible:
-            trust = trust_in(puppet.posed(item.pose, item.placement))
-            if trust.sign == SIGNS[-1]:
+            splats = puppet.posed(item.pose, item.placement)
+            trust = trust_in(splats)
+            if trust.sign == SIGNS[-1] and _is_in_photo(splats.means, document):
+                is_moved_only = item.pose is None and not any(item.placement.turn)
+                way = "moved" if is_moved_only else "turned"
                 found.append(
-                    f"{item.name} is turned so far that it is guesswork: the photo does not show"
+                    f"{item.name} is {way} so far that it is guesswork: the photo does not show"
                     f" {trust.invented:.0%} of what is seen of it now"
                 )
     return tuple(found)
+
+
+def _is_in_photo(points: np.ndarray, document: Document) -> bool:
+    """Whether any of `points` (N, 3) world are seen in the photo."""
+    seen = document.photo.camera.project(points[points[:, 2] > 0])
+    return bool(((seen >= 0) & (seen < document.photo.size)).all(1).any())
 
 
 def finished(
@@ -253,11 +263,7 @@ def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript
     texture = object_texture(matte, lifted)
 
     def pick(xy: tuple[float, float], option: str) -> Any:
-        width, height = document.photo.size
-        if not (0 <= xy[0] < width and 0 <= xy[1] < height):
-            raise ScriptError(
-                f"{option} {xy[0]:g},{xy[1]:g} is outside the photo of {width} x {height} px"
-            )
+        _check_within(document.photo.size, xy, option)
         point = puppet.pick(xy, None, Placement(), texture)
         if point is None:
             raise ScriptError(f"{option} {xy[0]:g},{xy[1]:g} misses the object")
@@ -273,6 +279,14 @@ def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript
         target = lifted.object_points(camera.unproject(np.array(handle.to), depth))
         document = edits.add_handle(document, k, point.rest, target)
     return document
+
+
+def _check_within(size: tuple[int, int], xy: tuple[float, float], option: str) -> None:
+    width, height = size
+    if not (0 <= xy[0] < width and 0 <= xy[1] < height):
+        raise ScriptError(
+            f"{option} {xy[0]:g},{xy[1]:g} is outside the photo of {width} x {height} px"
+        )
 
 
 def ordered(document: Document, others: Others) -> Document:
@@ -398,7 +412,13 @@ def has_left(item: EditObject, document: Document) -> bool:
 
 
 def _hints(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:
-    """From where the script has the background filled in, of a photo of `size` (w, h) px."""
+    """From where the script has the background filled in, of a photo of `size` (w, h) px.
+
+    Raises ScriptError for a place outside it.
+    """
+    for fill in script.fill_from:
+        for xy in (fill.source, fill.to):
+            _check_within(size, xy, "fill-from")
     usual = USUAL_HINT * float(np.hypot(*size))
     return tuple(
         Hint(fill.source, fill.to, usual if fill.radius is None else fill.radius)

@@ -88,10 +88,10 @@ def test_a_turn_of_one_number_is_a_yaw(folder):
 
 
 def test_key_poses_of_the_command_line_are_those_of_a_script(folder):
-    said = ["--key", "turn=-20 scale=0.9", "--key", "handle=78,45:90,45 pin=78,80", "--key", ""]
+    said = ["--key", "turn=-20 scale=0.9 spin=5", "--key", "handle=78,45:90,45 pin=78,80", "--key", ""]
     video = ["--video", "keys", "--seconds", "0.4", "--save-video"]
     assert _edit("--turn", "20", *said, *video, "said.webp", "--session", "e.omorph") == 0
-    poses = [{"turn": [-20], "scale": 0.9}, {"handle": [{"at": [78, 45], "to": [90, 45]}],
+    poses = [{"turn": [-20], "scale": 0.9, "spin": 5}, {"handle": [{"at": [78, 45], "to": [90, 45]}],
              "pin": [[78, 80]]}, {}]  # fmt: skip
     Path("keys.json").write_text(json.dumps({"turn": [20], "key": poses}))
     assert _edit("--script", "keys.json", *video, "read.webp") == 0
@@ -375,6 +375,7 @@ def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
     assert info["seed"] == 4
     assert info["objects"][0]["handles"] == 1
     assert info["objects"][0]["turn"] == [20, 0, 0]
+    assert info["objects"][0]["role"] == "edited"
     assert cli.main(["info", "s.omorph"]) == 0
     said = capsys.readouterr().out
     assert "photo: name photo.png, width 160, height 120, bits 8\n" in said
@@ -434,7 +435,12 @@ FAILURES = {
     "full mask": ([*EDIT[:5], "full.png"], "covers the whole photo"),
     "mask of other size": ([*EDIT[:5], "large.png"], "200.*150|150.*200"),
     "missing mask": ([*EDIT[:5], "none.png"], "none.png does not exist"),
-    "mask that is no image": ([*EDIT[:5], "text.jpg"], "image"),
+    "mask that is no image": ([*EDIT[:5], "text.jpg"], "text.jpg: .*image"),
+    "hidden part that is no image": ([*EDIT, "--hidden", "text.jpg"], "text.jpg: .*image"),
+    "front that is no image": ([*EDIT, "--front-mask", "text.jpg"], "text.jpg: .*image"),
+    "fill from outside": ([*EDIT, *TURN, "--fill-from", "500,5:9,9"], "fill-from 500,5 is outside"),
+    "fill outside": ([*EDIT, *TURN, "--fill-from", "9,9:-4,9"], "fill-from -4,9 is outside"),
+    "too many key poses": ([*EDIT, *["--key", "turn=5"] * 12], "key: there are 12 poses.* 11"),
     "handle beside the object": ([*EDIT, "--handle", "5,5:9,9"], "5,5 misses the object"),
     "handle outside the photo": ([*EDIT, "--handle", "500,5:9,9"], "500,5 is outside the photo"),
     "pin beside the object": ([*EDIT, "--pin", "5,5"], "5,5 misses the object"),
@@ -492,6 +498,7 @@ SCRIPTS = {
     "not an object": ("3", "not a JSON object"),
     "a key pose with another option": ('{"key": [{"refine": "none"}]}', "a pose has no 'refine'"),
     "a key pose beside the object": ('{"key": [{"pin": [[1, 1]]}]}', "key 1: pin 1,1 misses"),
+    "an output": ('{"report": "r.json"}', "'report' .*command line"),
     "unknown key": ('{"magic": 1}', "no option 'magic'"),
     "wrong value": ('{"turn": [1, 2, 3, 4]}', "turn"),
     "empty batch": ("[]", "empty"),

@@ -352,3 +352,10 @@ def test_every_stage_can_be_cancelled(stage):
 
     with pytest.raises(Cancelled):
         run_script(PHOTO, "a.png", script_from(QUICK | {"move": [5, 5]}), MASK_PNG, stop)
+
+
+def test_what_is_guesswork_is_said_of_what_is_seen():
+    """However far: what has left the photo is not seen at all."""
+    (note,) = _run(turn=[120, 0, 0]).notes
+    assert "is turned so far that it is guesswork" in note
+    assert _run(move=[3000, 0]).notes == ()

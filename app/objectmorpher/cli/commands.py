@@ -15,6 +15,7 @@ from objectmorpher_core.base.arrays import Mask
 from objectmorpher_core.base.files import read_input, write_all
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.settings import AS_IN_THE_PHOTO
 from objectmorpher_core.pictures.image import ENDINGS, encode_mask, encode_picture
 from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
@@ -27,7 +28,7 @@ from objectmorpher_core.scripting.options import (
     script_from,
 )
 from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, Export, encode_output
-from objectmorpher_core.scripting.report import provenance
+from objectmorpher_core.scripting.report import provenance, role_of
 from objectmorpher_core.scripting.runner import refuse_missing
 from objectmorpher_core.scripting.script import BatchItem, beside, read_scripts
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
@@ -280,10 +281,15 @@ def describe(document: Document) -> dict[str, Any]:
     """Describe the contents of a document in plain values."""
     width, height = document.photo.size
     objects = []
-    for item in document.objects:
+    for k, item in enumerate(document.objects):
         lifted = item.lifted
+        finish = {
+            name: value
+            for name, value in vars(item.finish).items()
+            if value != getattr(AS_IN_THE_PHOTO, name)
+        }
         objects.append({
-            "name": item.name,
+            "name": item.name, "role": role_of(document.objects, k),
             "mask_area_px": 0 if item.mask is None else int(item.mask.sum()),
             "gaussians": 0 if lifted is None else len(lifted.body),
             "edge_gaussians": 0 if lifted is None else len(lifted.gaussians) - len(lifted.body),
@@ -293,6 +299,7 @@ def describe(document: Document) -> dict[str, Any]:
             "is_moved": item.is_moved,
             "move": list(item.placement.move), "depth": item.placement.depth,
             "turn": list(item.placement.turn), "scale": item.placement.scale,
+            **finish,
         })  # fmt: skip
     return {
         "photo": {

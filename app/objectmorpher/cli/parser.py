@@ -394,7 +394,7 @@ def _handle(text: str) -> dict[str, Any]:
 def _key(text: str) -> dict[str, Any]:
     """A key pose: words such as turn=20 and pin=3,4, in any order; none is the pose at rest."""
     parsers = {"turn": _list(1, 3), "move": _list(2, 3), "scale": _list(1, 1),
-               "handle": _handle, "pin": _list(2, 2)}  # fmt: skip
+               "spin": _list(1, 1), "handle": _handle, "pin": _list(2, 2)}  # fmt: skip
     pose: dict[str, Any] = {}
     for word in text.split():
         name, _, value = word.partition("=")
@@ -406,7 +406,7 @@ def _key(text: str) -> dict[str, Any]:
         if name in ("handle", "pin"):
             pose.setdefault(name, []).append(parsed)
         else:
-            pose[name] = parsed[0] if name == "scale" else parsed
+            pose[name] = parsed[0] if name in ("scale", "spin") else parsed
     return pose
 
 

@@ -19,8 +19,8 @@ from .idle_options import refuse_idle, said_on
 from .terminal import UsageError
 
 if TYPE_CHECKING:
-    from ..server.cluster import Cluster
-    from ..server.front import HttpServer
+    from ..server.cluster import Cluster, ClusterPlan
+    from ..server.front import HttpServer, RequestLimits
 
 
 def add_serve(parser: argparse.ArgumentParser) -> None:
@@ -55,10 +55,8 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
 def run_serve(options: argparse.Namespace) -> None:
     """Serves until it is interrupted or ended."""
     from ..editor.settings import STAGES
-    from ..server.cluster import Cluster, ClusterPlan, Door
-    from ..server.front import Front, RequestLimits
-    from ..server.running import Alone
-    from ..server.table import table
+    from ..server.cluster import ClusterPlan
+    from ..server.front import RequestLimits
     from ..system.logs import show_log
 
     if options.web:
@@ -82,15 +80,38 @@ def run_serve(options: argparse.Namespace) -> None:
     plan = ClusterPlan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
     show_log()
     limits = RequestLimits(body=options.max_body << 20)
-    if options.alone:
-        served = {name: row for name, row in table().items() if row.stage in stages}
-        address = options.host, options.port
-        front = Front(address, token, Alone(stages), served, limits)
-        front.start()
-    else:
-        front = Cluster(plan, Door(options.host, options.port, token, limits), table())
+    with _named(options):
+        front = _front(options, stages, token, limits, plan)
     with _served(front):  # Ray sets handlers of signals when it starts, and has done so
         _greet(front.url, token if is_new else None, options)
+
+
+def _front(
+    options: argparse.Namespace, stages: tuple[str, ...], token: str, limits: RequestLimits,
+    plan: ClusterPlan,
+) -> HttpServer | Cluster:  # fmt: skip
+    """Listens, in this process or in a cluster."""
+    from ..server.cluster import Cluster, Door
+    from ..server.front import Front
+    from ..server.running import Alone
+    from ..server.table import table
+
+    if not options.alone:
+        return Cluster(plan, Door(options.host, options.port, token, limits), table())
+    served = {name: row for name, row in table().items() if row.stage in stages}
+    front = Front((options.host, options.port), token, Alone(stages), served, limits)
+    front.start()
+    return front
+
+
+@contextmanager
+def _named(options: argparse.Namespace) -> Iterator[None]:
+    """Say where nobody can listen, too."""
+    try:
+        yield
+    except OSError as error:
+        at, reason = f"{options.host}:{options.port}", error.strerror or str(error)
+        raise OSError(f"cannot listen on {at}: {reason}") from error
 
 
 def _run_web(options: argparse.Namespace) -> None:
@@ -102,7 +123,8 @@ def _run_web(options: argparse.Namespace) -> None:
     _check_address(options)
     token, is_new = _token(options.token_file)
     show_log()
-    server = WebServer((options.host, options.port), token, options.max_body << 20)
+    with _named(options):
+        server = WebServer((options.host, options.port), token, options.max_body << 20)
     server.start()
     with _served(server):
         _greet(server.url, token if is_new else None, options)

@@ -14,7 +14,7 @@ PROGRAM = "objectmorpher"
 FAILURES = (ValueError, OSError, RuntimeError, MemoryError)  # that are one sentence for the user
 
 
-OURS = ("objectmorpher", "objectmorpher_core")
+OURS = ("objectmorpher", "objectmorpher_core", "objectmorpher_research")
 
 
 class UsageError(ValueError):

@@ -91,3 +91,4 @@ def test_failures_are_one_sentence(sets, tmp_path, capsys, words, told):
     )
     said = capsys.readouterr()
     assert told in said.err and len(said.err.splitlines()) == 1 and not said.out
+    assert "went wrong" not in said.err, "it is no fault of the program"
