@@ -4,6 +4,8 @@
 uniform sampler2D layer;  // premultiplied sRGB
 uniform sampler2D blend;  // 1 shows the edit, 0 the photo
 uniform vec2 cells;       // canvas px that the blend covers
+uniform sampler2D photo;
+uniform vec2 photo_size;  // px
 uniform vec4 box;         // x0, y0, x1, y1 canvas px
 uniform vec4 photo_box;   // x0, y0, x1, y1 canvas px; nothing is drawn outside
 uniform float split;      // canvas px, left of which the photo is shown as it was
@@ -58,13 +60,12 @@ void main() {
     color.rgb = hatched(color.rgb, color.a, clamp(share / max(color.a, 1e-3), 0, 1), xy);
 #endif
     color *= opacity;
-    float shown = 1.0;
-#ifdef HAS_BLEND
-    shown = texture(blend, xy / cells).r;
-#endif
 #ifdef MODE
     vec3 below = texelFetch(under, ivec2(gl_FragCoord.xy), 0).rgb;
     color = vec4(mixed(below, color, MODE), 1.0);
 #endif
-    color *= shown;
+#ifdef HAS_BLEND  // what shows the photo shows it through the layer, too, not what lies between
+    vec3 original = texture(photo, (corner + xy / zoom) / photo_size).rgb;
+    color.rgb = mix(color.a * original, color.rgb, texture(blend, xy / cells).r);
+#endif
 }

@@ -40,7 +40,7 @@ def flatten(
     under, behind, blend = _packed_pixels(photo), _packed_pixels(back), frozen(blend)
     in_threads(lambda a, b: _mix(a, b, under, behind, blend, out), len(out), PARTS)
     for layer in layers:
-        _add(layer, _full(blend) if layer.is_weighed else blend, photo_box, out)
+        _add(layer, under, _full(blend) if layer.is_weighed else blend, photo_box, out)
     return out.view(np.uint8).reshape(*out.shape, 4)
 
 
@@ -57,8 +57,10 @@ def rehearse() -> None:
     flatten(some, some, blend, layers, box)
 
 
-def _add(layer: CanvasLayer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
-    """Draws a layer over what is there."""
+def _add(
+    layer: CanvasLayer, photo: np.ndarray, blend: F32, photo_box: Bounds, out: np.ndarray
+) -> None:
+    """Draws a layer over what is there; as much as it is covered by the `photo`."""
     low = [max(a, b, 0.0) for a, b in zip(layer.box[:2], photo_box[:2], strict=True)]
     size = out.shape[1], out.shape[0]
     high = [min(a, b, c) for a, b, c in zip(layer.box[2:], photo_box[2:], size, strict=True)]
@@ -72,11 +74,11 @@ def _add(layer: CanvasLayer, blend: F32, photo_box: Bounds, out: np.ndarray) -> 
     if layer.is_coarse:
         x, x_share = _places(x0, x1, layer.box[0], layer.box[2], pixels.shape[1])
         y, y_share = _places(y0, y1, layer.box[1], layer.box[3], pixels.shape[0])
-        inputs = (x0, y0, pixels, x, x_share, y, y_share, gain, blend, out)
+        inputs = (x0, y0, pixels, x, x_share, y, y_share, gain, photo, blend, out)
         in_threads(lambda a, b: _add_coarse(a, b, *inputs), y1 - y0, PARTS)
     else:
         left, top = x0 - round(layer.box[0]), y0 - round(layer.box[1])
-        inputs = (x0, y0, pixels, left, top, x1 - x0, gain, blend, out)
+        inputs = (x0, y0, pixels, left, top, x1 - x0, gain, photo, blend, out)
         in_threads(lambda a, b: _add_exact(a, b, *inputs), y1 - y0, PARTS)
 
 
@@ -142,28 +144,31 @@ def _mix(first, last, photo, back, blend, out):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _add_exact(first, last, left, top, pixels, skipped, above, width, gain, blend, out):
+def _add_exact(first, last, left, top, pixels, skipped, above, width, gain, photo, blend, out):
     """Rows first..last of a layer that is px for px, without its first columns and rows."""
     cells, row = _room(blend)
     for line in range(first, last):
         y = top + line
         _blend_row(blend, y, cells, row)
-        share, to = row[CELL // 2 + left :], out[y, left:]
+        share, to, under = row[CELL // 2 + left :], out[y, left:], photo[y, left:]
         layer = pixels[above + line, skipped:]
         for x in range(np.uint64(width)):
             p = layer[x]
-            to[x] = _covered(to[x], _red(p), _green(p), _blue(p), _alpha(p), gain, share[x])
+            colour = _red(p), _green(p), _blue(p), _alpha(p)
+            to[x] = _covered(to[x], colour, gain, share[x], under[x])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _add_coarse(first, last, left, top, pixels, xs, x_shares, ys, y_shares, gain, blend, out):
+def _add_coarse(
+    first, last, left, top, pixels, xs, x_shares, ys, y_shares, gain, photo, blend, out
+):
     """Rows first..last of a layer with fewer px than its box, bilinear."""
     cells, row = _room(blend)
     most_x, most_y = pixels.shape[1] - 1, pixels.shape[0] - 1
     for line in range(first, last):
         y = top + line
         _blend_row(blend, y, cells, row)
-        share, to = row[CELL // 2 + left :], out[y, left:]
+        share, to, under = row[CELL // 2 + left :], out[y, left:], photo[y, left:]
         i, t = ys[line], y_shares[line]
         below = min(i + 1, most_y)
         for x in range(len(xs)):
@@ -172,23 +177,28 @@ def _add_coarse(first, last, left, top, pixels, xs, x_shares, ys, y_shares, gain
             j, s = xs[x], x_shares[x]
             right = min(j + 1, most_x)
             a, b, c, d = pixels[i, j], pixels[i, right], pixels[below, j], pixels[below, right]
-            to[x] = _covered(
-                to[x],
+            colour = (
                 _between(_red(a), _red(b), _red(c), _red(d), s, t),
                 _between(_green(a), _green(b), _green(c), _green(d), s, t),
                 _between(_blue(a), _blue(b), _blue(c), _blue(d), s, t),
                 _between(_alpha(a), _alpha(b), _alpha(c), _alpha(d), s, t),
-                gain, share[x],
-            )  # fmt: skip
+            )
+            to[x] = _covered(to[x], colour, gain, share[x], under[x])
 
 
 @numba.njit(inline="always", error_model="numpy", fastmath=EXACT)
-def _covered(p, r, g, b, a, gain, share):
-    """The pixel `p` under a premultiplied colour in its light (light.glsl)."""
+def _covered(p, colour, gain, share, photo):
+    """The pixel `p` under a premultiplied colour in its light (light.glsl, layer.frag).
+
+    But for its `share` the colour is that of the photo's pixel: it does not show what lies between.
+    """
+    r, g, b, a = colour
     r, g, b = min(r * gain[0], a), min(g * gain[1], a), min(b * gain[2], a)
-    rest = ONE - share * a / FULL
+    rest, still = ONE - a / FULL, (ONE - share) * a / FULL
     return _packed(
-        rest * _red(p) + share * r, rest * _green(p) + share * g, rest * _blue(p) + share * b
+        rest * _red(p) + share * r + still * _red(photo),
+        rest * _green(p) + share * g + still * _green(photo),
+        rest * _blue(p) + share * b + still * _blue(photo),
     )
 
 

@@ -242,7 +242,7 @@ def _as_u8(pixels: np.ndarray) -> np.ndarray:
 
 # Where the edit is shown and where the photo, for the passes that ask.
 
-BLEND = 7  # texture unit, bound for all passes
+BLEND, ORIGINAL = 7, 8  # texture units, bound for all passes: the blend, the photo
 ALL = np.ones((1, 1), np.float32)  # the edit everywhere
 
 

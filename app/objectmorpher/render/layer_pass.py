@@ -12,7 +12,7 @@ from objectmorpher_core.document.bounds import MODES, NORMAL
 
 from ..canvas.layer import CanvasLayer
 from ..editor.view import ViewState
-from .gpu_memory import BLEND, blend_cells
+from .gpu_memory import BLEND, ORIGINAL, blend_cells
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject
 from .shaders import Programs, set_uniforms
@@ -91,6 +91,7 @@ LAYER, MARKS, RELIT, AMOUNTS, NOISE, DEVIATIONS, UNDER = (0, 1, 2, 4, 5, 6, 3)  
 _UNITS = {
     "layer": LAYER, "marks": MARKS, "relit": RELIT, "blend": BLEND,
     "amounts": AMOUNTS, "grain": NOISE, "deviations": DEVIATIONS, "under": UNDER,
+    "photo": ORIGINAL,
 }  # fmt: skip
 TINT = 0.6  # opacity
 
@@ -182,6 +183,9 @@ class LayerPass:
             photo_box=photo_box(scene, view),
             cells=blend_cells(scene),
             split=scene.split * view.width,
+            corner=(view.left, view.top),
+            zoom=view.zoom,
+            photo_size=scene.photo.shape[1::-1],
         )
         self._context.enable(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
@@ -272,7 +276,7 @@ class GrainTextures:
         high = view.canvas_from_image(corner + grain.pitch * np.array([columns, rows]))
         return {
             "amounts_box": (float(low[0]), float(low[1]), float(high[0]), float(high[1])),
-            "corner": (view.left, view.top), "zoom": view.zoom, "grain_texel": float(2**level),
+            "grain_texel": float(2**level),
         }  # fmt: skip
 
     def _upload_noise(self, noise: Noise, level: int) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import moderngl
 
 from ..editor.view import ViewState
-from .gpu_memory import BLEND, PictureTexture, blend_cells
+from .gpu_memory import BLEND, ORIGINAL, PictureTexture, blend_cells
 from .scene import Hatch, Scene
 from .shaders import Programs, set_uniforms
 
@@ -32,6 +32,7 @@ class PhotoPass:
         self._photo.use(PHOTO, view.zoom)
         self._plate.use(PLATE, view.zoom)
         self._mask.use(MASK, view.zoom)
+        self.use_photo(view)
         height, width = scene.photo.shape[:2]
         plate_box = scene.plate.box if scene.plate else (0, 0, -1, -1)
         program, quad = self._programs(*_defines(scene))
@@ -52,6 +53,10 @@ class PhotoPass:
             cells=blend_cells(scene),
         )
         quad.render(moderngl.TRIANGLE_STRIP, 4)
+
+    def use_photo(self, view: ViewState) -> None:
+        """Bind what was uploaded last, for the layers over it."""
+        self._photo.use(ORIGINAL, view.zoom)
 
 
 def hatch_uniforms(hatch: Hatch | None, view: ViewState) -> dict[str, Any]:

@@ -300,6 +300,7 @@ class Renderer:
                     picture = self._defocus_pass.draw(picture, item, view.zoom)
                 self._use(viewport)
                 self._blend.use(scene)
+                self._photo_pass.use_photo(view)
                 self._layer_pass.draw_picture(picture, item, scene, view)
         if self._splat_pass is not None:
             self._splat_pass.sweep()

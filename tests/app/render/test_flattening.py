@@ -122,11 +122,29 @@ def test_where_nothing_is_mixed_the_bytes_stay() -> None:
     blend = np.zeros((size[0] // CELL, size[1] // CELL), np.float32)
     blend[:, 8:] = 1.0
     layer = CanvasLayer((0.0, 0.0, float(size[1]), float(size[0])), item)
-    flat = flatten(photo, back, blend, (layer,), layer.box)[::-1]
+    flat = flatten(photo, back, blend, (layer,), layer.box)
     edge = 8 * CELL
     wanted = np.where(item[..., 3:] > 0, item, back)[:, edge + CELL :]
     assert np.array_equal(flat[:, : edge - CELL], photo[:, : edge - CELL])
     assert np.array_equal(flat[:, edge + CELL :], wanted)
+
+
+def test_no_line_shows_where_an_object_that_moved_meets_what_did_not(
+    renderer, monkeypatch, scene: Scene
+) -> None:
+    """However much of the photo and of the edit is shown, where both look alike it looks so."""
+    view = _view(1.9)
+    left, top, right, bottom = 40, 30, 130, 100
+    grey = np.full_like(scene.photo, 120)
+    item = np.full((bottom - top, right - left, 4), 120, np.uint8)
+    item[..., 3] = 255
+    layer = CanvasLayer((float(left), float(top), float(right), float(bottom)), item)
+    still = replace(scene, photo=grey, shades=(), layers=(layer,))
+    flat, drawn, _ = _both(renderer, monkeypatch, still, view)
+    x0, y1 = VIEWPORT[0] + left, SIZE[1] - VIEWPORT[1] - VIEWPORT[3] + bottom
+    for shown in (flat, drawn):
+        there = shown[y1 - (bottom - top) : y1, x0 : x0 + right - left]
+        assert np.abs(there - 120).max() <= 1
 
 
 def test_another_background_is_seen_at_once(renderer, monkeypatch, scene: Scene) -> None:
