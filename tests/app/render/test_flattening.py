@@ -139,7 +139,10 @@ def test_no_line_shows_where_an_object_that_moved_meets_what_did_not(
     item = np.full((bottom - top, right - left, 4), 120, np.uint8)
     item[..., 3] = 255
     layer = CanvasLayer((float(left), float(top), float(right), float(bottom)), item)
-    still = replace(scene, photo=grey, shades=(), layers=(layer,))
+    random = np.random.default_rng(6)
+    plate = Plate(0, 0, random.integers(0, 255, grey.shape, np.uint8), grey[..., 0] > 0, "made")
+    blend = random.random((-(-VIEWPORT[3] // CELL), -(-VIEWPORT[2] // CELL)), np.float32)
+    still = replace(scene, photo=grey, plate=plate, shades=(), layers=(layer,), blend=blend)
     flat, drawn, _ = _both(renderer, monkeypatch, still, view)
     x0, y1 = VIEWPORT[0] + left, SIZE[1] - VIEWPORT[1] - VIEWPORT[3] + bottom
     for shown in (flat, drawn):
