@@ -95,6 +95,7 @@ JPEG_MAX_SIDE = 65535  # px
 AVIF_MAX_SIDE = 65535  # px
 AVIF_SPEED = 8  # of 10; 6 takes three times as long for 3 % less
 REASON = 200  # characters of what a decoder says
+COLOURED = 4  # levels of 255 between channels, from which on a grey photo has got colour
 LOSSLESS = 100  # quality of WebP that keeps every pixel
 
 Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard, which fires before ours in some formats
@@ -287,12 +288,14 @@ def encode_picture(
 
     PNG and TIFF keep the bit depth; 16 bits are rounded to 8 for the others. `quality` is that of
     JPEG and AVIF; WebP and JPEG XL are lossless unless `webp_quality` is below 100. Grey stays
-    grey (not in WebP and AVIF, which have none). Raises ImageError for an unknown ending, and
-    where the format cannot hold the picture.
+    grey (not in WebP and AVIF, which have none) unless something of another colour came into it.
+    Raises ImageError for an unknown ending, and where the format cannot hold the picture.
     """
     ending = "." + ending.lower().removeprefix(".")
     if ending not in ENDINGS:
         raise ImageError(f"pictures cannot be written as {ending}, only as {', '.join(ENDINGS)}")
+    if picture.is_grey and _has_colour(picture.pixels):
+        picture = replace(picture, is_grey=False)
     try:
         if ending in (".jpg", ".jpeg"):
             return _encode_jpeg(picture, quality)
@@ -332,6 +335,14 @@ class _Channels:
         if picture.alpha is None:
             return colours
         return np.concatenate([colours, picture.alpha[rows][..., None]], axis=2)
+
+
+def _has_colour(pixels: Pixels) -> bool:
+    """Whether any pixel is of another colour than a rounded grey."""
+    least = COLOURED * np.iinfo(pixels.dtype).max / 255
+    red, green, blue = (pixels[..., k] for k in range(3))
+    pairs = (red, green), (green, blue), (blue, red)
+    return any(int(cv2.absdiff(a, b).max(initial=0)) > least for a, b in pairs)
 
 
 def _grey(pixels: Pixels) -> np.ndarray:

@@ -88,11 +88,14 @@ def test_a_turn_of_one_number_is_a_yaw(folder):
 
 
 def test_key_poses_of_the_command_line_are_those_of_a_script(folder):
-    said = ["--key", "turn=-20 scale=0.9 spin=5", "--key", "handle=78,45:90,45 pin=78,80", "--key", ""]
+    said = ["--key", "turn=-20 scale=0.9 spin=5", "--key", "handle=78,45:90,45 pin=78,80"]
+    said += ["--key", ""]
     video = ["--video", "keys", "--seconds", "0.4", "--save-video"]
     assert _edit("--turn", "20", *said, *video, "said.webp", "--session", "e.omorph") == 0
-    poses = [{"turn": [-20], "scale": 0.9, "spin": 5}, {"handle": [{"at": [78, 45], "to": [90, 45]}],
-             "pin": [[78, 80]]}, {}]  # fmt: skip
+    poses = [
+        {"turn": [-20], "scale": 0.9, "spin": 5},
+        {"handle": [{"at": [78, 45], "to": [90, 45]}], "pin": [[78, 80]]}, {},
+    ]  # fmt: skip
     Path("keys.json").write_text(json.dumps({"turn": [20], "key": poses}))
     assert _edit("--script", "keys.json", *video, "read.webp") == 0
     assert Path("said.webp").read_bytes() == Path("read.webp").read_bytes()

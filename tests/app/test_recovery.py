@@ -89,7 +89,10 @@ def test_it_is_offered_after_the_last_of_several_files(editor: Editor, photo_pat
 def test_discarding_deletes_it(editor: Editor) -> None:
     folder = leave("cat", 9)
     editor.recovery.look()
-    editor.recovery.discard(editor.recovery.left[0])
+    (left,) = editor.recovery.left
+    editor.recovery.ask_to_discard(left)
+    assert folder.exists() and editor.recovery.left == (left,), "it is asked first"
+    editor.recovery.ask_to_discard(left)
     assert not folder.exists()
     assert editor.recovery.left == ()
 

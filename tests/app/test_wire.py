@@ -93,11 +93,22 @@ class Square:
         return self.side.length**2
 
 
+class PlainSquare:
+    """The same, and no dataclass."""
+
+    def __init__(self, side: Side, name: str) -> None:
+        self.side, self.name = side, name
+
+    @cached_property
+    def area(self) -> float:
+        return self.side.length**2
+
+
 class Side:
     """Asks for the area of its squares while it is sent, as another thread does."""
 
     def __init__(self, length: float) -> None:
-        self.length, self.squares = length, list[Square]()
+        self.length, self.squares = length, list[Square | PlainSquare]()
 
     def __reduce__(self) -> tuple[Any, ...]:
         for square in self.squares:
@@ -106,11 +117,12 @@ class Side:
 
 
 def test_a_value_may_grow_while_it_is_sent(line: Line) -> None:
-    side = Side(3.0)
-    square = Square(side, "first")
-    side.squares.append(square)
-    got = line.little(square)
-    assert (got.side.length, got.name, got.area) == (3.0, "first", 9.0)
+    for kind in (Square, PlainSquare):
+        side = Side(3.0)
+        square = kind(side, "first")
+        side.squares.append(square)
+        got = line.little(square)
+        assert (got.side.length, got.name, got.area) == (3.0, "first", 9.0)
 
 
 def test_what_was_forgotten_is_sent_again(line: Line) -> None:

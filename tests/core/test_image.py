@@ -86,6 +86,21 @@ def test_8_bit_round_trip(ending, kind, chelsea):
     assert back.is_grey == (picture.is_grey and ending != ".webp")  # WebP has no grey
 
 
+@over("ending", LOSSLESS)
+@over("is_deep", [False, True])
+def test_a_grey_photo_that_something_coloured_came_into_has_colour(ending, is_deep, chelsea):
+    pixels = np.repeat(chelsea[:97, :131, :1], 3, axis=2)
+    pixels[..., 1] -= (pixels[..., 1] > 0).astype(np.uint8)  # rounded otherwise: still grey
+    pixels = deep(pixels) if is_deep and ending in DEEP else pixels
+    back = read_picture(encode_picture(Picture(pixels, is_grey=True), ending))
+    assert (np.ptp(back.pixels, axis=2) == 0).all() or ending == ".webp"
+    painted = pixels.copy()
+    painted[20:30, 20:30, 0] //= 2
+    back = read_picture(encode_picture(Picture(painted, is_grey=True), ending))
+    np.testing.assert_array_equal(back.pixels, painted)
+    assert not back.is_grey
+
+
 @pytest.mark.parametrize("ending", DEEP)
 @pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
 def test_16_bit_round_trip(ending, kind, chelsea):
@@ -160,7 +175,8 @@ def test_profile_and_exif_are_kept(ending, chelsea):
 
 
 def test_a_grey_profile_never_reaches_a_colour_file(chelsea):
-    picture = Picture(chelsea, is_grey=True, icc=GREY_PROFILE)
+    grey = np.repeat(chelsea[..., :1], 3, axis=2)
+    picture = Picture(grey, is_grey=True, icc=GREY_PROFILE)
     assert read_picture(encode_picture(picture, "png")).icc == GREY_PROFILE
     assert read_picture(encode_picture(picture, "webp")).icc is None
 

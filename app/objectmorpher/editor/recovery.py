@@ -50,6 +50,7 @@ class Recovery:
     def __init__(self, editor: EditorState, tabs: Tabs) -> None:
         self._editor, self._tabs = editor, tabs
         self.left: tuple[Left, ...] = ()  # newest first
+        self.doubted: Left | None = None  # asked whether it may be discarded
         self._is_unseen = False
         self._offer: StatusMessage | None = None
 
@@ -91,6 +92,13 @@ class Recovery:
         """The tab is left: what is still offered there is offered again when a file has opened."""
         if self._offer is not None and self._editor.message is self._offer:
             self._is_unseen = True
+
+    def ask_to_discard(self, left: Left) -> None:
+        """The first time it is only asked whether that is meant: nothing brings it back."""
+        if self.doubted is left:
+            self.discard(left)
+        else:
+            self.doubted = left
 
     def discard(self, left: Left) -> None:
         """Deletes it for good."""

@@ -60,7 +60,6 @@ class Settings:
     proof_profile: str = ""  # path of an ICC file, by which colours are proofed
     quality: int = 95  # of JPEG exports
     webp_quality: int = 100  # of WebP exports; 100 is lossless
-    export_what: str = "Photo"  # the last export's, see `export_plan.py`
     export_format: str = ""  # empty: the photo's own
     export_bits: int = 0  # 8 or 16; 0: the photo's own
     export_motion: str = "Photo to edit"

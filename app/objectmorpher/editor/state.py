@@ -51,6 +51,7 @@ class Tab:
     is_lifting: bool = False  # a lift was stopped when the tab was left
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
+    exported: str = ""  # what of it was exported last, see `export_plan.py`
     autosave: Autosave = field(init=False)
 
     def __post_init__(self) -> None:

@@ -418,11 +418,18 @@ class Tasks:
         if editor.preview is not None:
             editor.preview = change(editor.preview)
 
-    def render_exact(self, request: ExactPicture, accept: Callable[[Rendered], None]) -> None:
-        """Asks for an exact picture of the view, which shows a draft meanwhile."""
+    def render_exact(
+        self, request: ExactPicture, accept: Callable[[Rendered], None], is_again: bool = False
+    ) -> None:
+        """Asks for an exact picture of the view, which shows a draft meanwhile; twice if it fails."""
+
+        def fail(_: JobError) -> None:
+            if not is_again:
+                self.render_exact(request, accept, is_again=True)
+
         self._editor.jobs.start(
             "Drawing", job_functions.render_exact, request,
-            done=accept, failed=lambda error: None, kind=f"draw {request.part}", is_quiet=True,
+            done=accept, failed=fail, kind=f"draw {request.part}", is_quiet=True,
         )  # fmt: skip
 
     def light(self, k: int, work: Callable[[], Lit], accept: Callable[[Lit], None]) -> None:

@@ -17,7 +17,6 @@ import pickle
 import socket
 import sys
 from collections import OrderedDict
-from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
@@ -152,7 +151,8 @@ class _Pickler(pickle.Pickler):
 
         A cached property is kept among the value's fields, which must not grow under the pickler.
         """
-        if not is_dataclass(type(obj)):
+        is_plain = type(obj).__module__ == "builtins" or isinstance(obj, type)
+        if is_plain or not hasattr(obj, "__dict__"):
             return NotImplemented
         reduced = obj.__reduce_ex__(pickle.HIGHEST_PROTOCOL)
         if isinstance(reduced, str) or len(reduced) < 3 or type(reduced[2]) is not dict:

@@ -16,6 +16,7 @@ from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.export_plan import FORMATS, Format, VideoMotion, What
 from objectmorpher.editor.settings import Settings
+from objectmorpher.editor.state import Tab
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.pictures.image import read_picture
@@ -241,10 +242,12 @@ def test_the_last_choice_is_remembered(moved: Editor) -> None:
     assert moved.exporting.draft is not None
     assert moved.exporting.draft.what is What.CUTOUT
     assert moved.exporting.draft.format is Format.WEBP
-    moved.settings = replace(moved.settings, export_what="nonsense", export_format="GIF")
+    kept, moved.tab.exported = moved.tab.exported, "nonsense"
+    moved.settings = replace(moved.settings, export_format="GIF")
     moved.exporting.open()
     assert (moved.exporting.draft.what, moved.exporting.draft.format) == (What.PHOTO, Format.PNG)
     moved.exporting.close()
+    assert kept == What.CUTOUT.value and Tab().exported == "", "of another photo the photo first"
 
 
 @pytest.mark.parametrize("name", ["/", "..", "~", "~nobody/x", "x" * 300, "a/b", ".", "\0"])

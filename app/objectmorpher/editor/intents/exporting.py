@@ -63,10 +63,10 @@ class Exporting:
     # Choosing
 
     def open(self) -> None:
-        """Begins with what was exported last."""
+        """Begins with what was exported last of this tab, else with the photo."""
         editor, settings = self._editor, self._editor.settings
         self._replacing = None
-        what = next((w for w in What if w.value == settings.export_what), What.PHOTO)
+        what = next((w for w in What if w.value == editor.tab.exported), What.PHOTO)
         what = what if self.why_not(what) is None else What.PHOTO
         format = next((f for f in Format if f.value == settings.export_format), self.own_format)
         file = editor.source or editor.path
@@ -382,9 +382,10 @@ class Exporting:
         format = "" if draft.format is self.own_format else draft.format.value
         if len(FORMATS[draft.what]) == 1:  # nobody chose it
             format = editor.settings.export_format
+        editor.tab.exported = draft.what.value
         editor.settings = replace(
-            editor.settings, export_what=draft.what.value, export_format=format,
-            export_bits=draft.bits, quality=draft.quality, webp_quality=draft.webp_quality,
+            editor.settings, export_format=format, export_bits=draft.bits,
+            quality=draft.quality, webp_quality=draft.webp_quality,
             export_motion=draft.motion.value, export_seconds=draft.seconds,
             export_folder=str(path.parent.absolute()),
         )  # fmt: skip

@@ -129,7 +129,7 @@ class Objects:
         editor = self._editor
         if editor.document is None or editor.object is None or editor.hand.is_busy:
             return
-        name, k = editor.object.name, editor.current
+        name, k, item = editor.object.name, editor.current, editor.object
         if editor.object.is_locked:
             editor.say_locked(k)
             return
@@ -138,7 +138,11 @@ class Objects:
         left = edits.remove_object(editor.document, k)
         editor.apply(t("Remove object"), left)
         self.choose(max(min(k, len(left.objects) - 1), 0))
-        editor.say(t("{name} is removed · Ctrl+Z brings it back", name=name))
+        is_in_photo = not item.is_visitor and all(o.mask is not item.mask for o in left.objects)
+        if is_in_photo:
+            editor.say(t("{name} is as it was in the photo · Ctrl+Z brings the edit back", name=name))
+        else:
+            editor.say(t("{name} is removed · Ctrl+Z brings it back", name=name))
 
     def other_at(self, canvas_xy: np.ndarray) -> int | None:
         """Another lifted object that is in front of all at canvas px; None where the current is."""

@@ -164,6 +164,7 @@ def _draw_centred(text: str, middle: float, top: float, role: str, size: float =
 
 ROW = 56.0  # points
 MOST = 3  # shown at a time
+REST = 24.0  # points of the line that counts the others
 LONGEST = 40  # letters of a name
 GAP = 12.0
 RECOVER, DISCARD = 96.0, 88.0  # widths of the buttons
@@ -172,7 +173,8 @@ RECOVER, DISCARD = 96.0, 88.0  # widths of the buttons
 def recovery_height(editor: Editor) -> float:
     """Points that the list takes, with the gap below it."""
     count = min(len(editor.recovery.left), MOST)
-    return count * (ROW + 8) + GAP if count else 0.0
+    more = REST if len(editor.recovery.left) > MOST else 0.0
+    return count * (ROW + 8) + more + GAP if count else 0.0
 
 
 def draw_recovery(editor: Editor, width: float) -> None:
@@ -180,6 +182,9 @@ def draw_recovery(editor: Editor, width: float) -> None:
     shown = editor.recovery.left[:MOST]
     for left in shown:
         _draw_left(editor, left, width)
+    if rest := len(editor.recovery.left) - len(shown):
+        with small_text():
+            imgui.text_colored(theme.vec("secondary"), t("{count} more after these", count=rest))
     if shown:
         imgui.dummy(theme.size(0, GAP - 8))
 
@@ -202,8 +207,12 @@ def _draw_left(editor: Editor, left: Left, width: float) -> None:
     imgui.push_id(str(left.folder))
     top = low.y + theme.pt((ROW - FIELD) / 2)
     imgui.set_cursor_screen_pos(ImVec2(high.x - theme.pt(DISCARD + 12), top))
-    if button(t("Discard"), width=DISCARD):
-        editor.recovery.discard(left)
+    is_sure = editor.recovery.doubted is left
+    label, kind = t("Discard"), Emphasis.PLAIN
+    if is_sure:
+        label, kind = t("Really?"), Emphasis.PRIMARY_SMALL
+    if button(label, kind, width=DISCARD):
+        editor.recovery.ask_to_discard(left)
     if not left.problem:
         imgui.set_cursor_screen_pos(ImVec2(high.x - theme.pt(RECOVER + DISCARD + 20), top))
         if button(t("Recover"), width=RECOVER):

@@ -14,7 +14,7 @@ from ...editor.view import Shown
 from ...render.scene import Hatch
 from ...system.texts import t
 from ..widgets.panes import Rect
-from ..widgets.theme import theme
+from ..widgets.theme import PRIMARY, theme
 from ..widgets.widgets import bold_text, small_text
 from ..window.scenes import INPAINTED, LIFTED, REFINED
 
@@ -42,7 +42,8 @@ class Legend:
         }
         self._height, self._draw_rows = rows.get(self._shown, (0.0, lambda: None))
         self._left = rect.x + rect.width - theme.pt(PAD + WIDTH)
-        self._top = rect.y + rect.height - theme.pt(PAD + self._panel_height)
+        folded = 0.0 if editor.view.has_panel else PRIMARY + PAD  # the next step has the corner
+        self._top = rect.y + rect.height - theme.pt(PAD + self._panel_height + folded)
         self._y = self._top
 
     @property

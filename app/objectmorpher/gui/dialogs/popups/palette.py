@@ -68,7 +68,7 @@ class CommandPalette:
     def _draw_lines(self, editor: Editor, found: list[Entry], is_moved: bool) -> None:
         imgui.begin_child("##found", ImVec2(0, 0))
         if not found:
-            imgui.text_colored(theme.vec("secondary"), t("Nothing is called so"))
+            imgui.text_colored(theme.vec("secondary"), t("No command has such a name"))
         for n, entry in enumerate(found):
             self._draw_line(editor, entry, n)
             if is_moved and n == self._chosen:
