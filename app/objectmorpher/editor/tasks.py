@@ -421,7 +421,7 @@ class Tasks:
     def render_exact(
         self, request: ExactPicture, accept: Callable[[Rendered], None], is_again: bool = False
     ) -> None:
-        """Asks for an exact picture of the view, which shows a draft meanwhile; twice if it fails."""
+        """Asks for an exact picture of the view, which shows a draft; twice if it fails."""
 
         def fail(_: JobError) -> None:
             if not is_again:

@@ -140,7 +140,7 @@ class Objects:
         self.choose(max(min(k, len(left.objects) - 1), 0))
         is_in_photo = not item.is_visitor and all(o.mask is not item.mask for o in left.objects)
         if is_in_photo:
-            editor.say(t("{name} is as it was in the photo · Ctrl+Z brings the edit back", name=name))
+            editor.say(t("{name} is as it was in the photo · Ctrl+Z undoes that", name=name))
         else:
             editor.say(t("{name} is removed · Ctrl+Z brings it back", name=name))
 
