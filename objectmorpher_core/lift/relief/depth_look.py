@@ -14,6 +14,7 @@ import numpy as np
 
 from ... import models
 from ...base.arrays import F32, RGB, Mask, Pixels
+from ...base.masks import box_of
 from ...models.depth_net import DepthNet
 from ...pictures.image import to_u8
 from .. import LiftError
@@ -80,13 +81,8 @@ def installed() -> There | None:
 
 def box_around(mask: Mask) -> tuple[int, int, int, int]:
     """x0, y0, x1, y1 px of what is looked at."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    longer = max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1
-    margin, (height, width) = int(np.ceil(MARGIN * longer)), mask.shape
-    return (
-        max(int(columns[0]) - margin, 0), max(int(rows[0]) - margin, 0),
-        min(int(columns[-1]) + 1 + margin, width), min(int(rows[-1]) + 1 + margin, height),
-    )  # fmt: skip
+    x0, y0, x1, y1 = box_of(mask)
+    return box_of(mask, int(np.ceil(MARGIN * max(x1 - x0, y1 - y0))))
 
 
 class Net(Protocol):
