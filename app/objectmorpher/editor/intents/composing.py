@@ -13,7 +13,7 @@ from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
-from objectmorpher_core.document.settings import Finish, Hint, Shadow
+from objectmorpher_core.document.settings import Finish, Hint, Shadow, Share
 
 from ...canvas.layer import CanvasLayer
 from ...canvas.memo import same
@@ -292,17 +292,9 @@ class Composing:
         """Previews another shadow of the current object; `Editor.commit` makes it a step."""
         self._preview(lambda document, k: edits.set_shadow(document, k, shadow))
 
-    def preview_harmony(self, harmony: float) -> None:
-        self._preview(lambda document, k: edits.set_harmony(document, k, harmony))
-
-    def preview_relight(self, relight: float) -> None:
-        self._preview(lambda document, k: edits.set_relight(document, k, relight))
-
-    def preview_grain(self, grain: float) -> None:
-        self._preview(lambda document, k: edits.set_grain(document, k, grain))
-
-    def preview_defocus(self, defocus: float) -> None:
-        self._preview(lambda document, k: edits.set_defocus(document, k, defocus))
+    def preview_share(self, name: Share, share: float) -> None:
+        """Previews how far the current object fits into its new place."""
+        self._preview(lambda document, k: edits.set_share(document, k, name, share))
 
     def preview_finish(self, finish: Finish) -> None:
         """Previews another opacity and other colours of the current object."""

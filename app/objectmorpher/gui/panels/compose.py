@@ -20,10 +20,7 @@ from objectmorpher_core.document.settings import (
     LEAST_FEATHER,
     MOST_FEATHER,
     MOST_SHADOW,
-    USUAL_DEFOCUS,
-    USUAL_GRAIN,
-    USUAL_HARMONY,
-    USUAL_RELIGHT,
+    USUAL_SHARES,
 )
 
 from ...commands import run
@@ -256,16 +253,12 @@ def _draw_light(editor: Editor) -> None:
     if editor.composing.refiner == "none":
         note(t("Harmonise gives the object the light of its new place and of how it is turned."))
         return
-    item, composing = editor.object, editor.composing
-    rows = (
-        (t("Place"), 100 * USUAL_HARMONY, item.harmony, composing.preview_harmony),
-        (t("Turning"), 100 * USUAL_RELIGHT, item.relight, composing.preview_relight),
-        (t("Grain"), 100 * USUAL_GRAIN, item.grain, composing.preview_grain),
-        (t("Focus"), 100 * USUAL_DEFOCUS, item.defocus, composing.preview_defocus),
-    )
-    for name, usual, share, preview in rows:
-        change = number_field(Number(name, "%.0f %%", 0.5, 5.0, usual, 0.0, 100.0), 100 * share)
-        _take(editor, change, lambda p=preview, c=change: p(c.value / 100), t("Adjust light"))
+    item, preview = editor.object, editor.composing.preview_share
+    labels = t("Place"), t("Turning"), t("Grain"), t("Focus")
+    for label, (name, usual) in zip(labels, USUAL_SHARES.items(), strict=True):
+        number = Number(label, "%.0f %%", 0.5, 5.0, 100 * usual, 0.0, 100.0)
+        change = number_field(number, 100 * getattr(item, name))
+        _take(editor, change, lambda n=name, c=change: preview(n, c.value / 100), t("Adjust light"))
     note(t("Light around its new place; light that stays where it was while it turns."))
     note(t("Grain: the photo's own, where moving the object has smoothed it."))
     note(t("Focus: nearer or farther, as blurred as the photo is there."))
