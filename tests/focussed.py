@@ -72,7 +72,7 @@ def scene(far: float, name: str = "slabs") -> Document:
     pixels = np.rint(255 * rgb.clip(0, 1)).astype(np.uint8)
     document = shapes.lifted_scene(pixels, inside, 3000).document()
     document = edits.set_horizon(document, HORIZON)
-    return edits.set_defocus(document, 0, 1.0)
+    return edits.set_share(document, 0, "defocus", 1.0)
 
 
 def farther(document: Document, ratio: float) -> Document:

@@ -99,7 +99,7 @@ def _moved_about(name: str, pixels: Pixels, mask: np.ndarray) -> Sharp:
     matte, lifted = lift_mask(pixels, camera, mask, "relief")
     item = EditObject("Object", mask=mask).with_lifted(matte, lifted)
     taken = Photo(Picture(pixels), camera, encode_picture(Picture(pixels), ".png"), "photo.png")
-    document = edits.set_defocus(Document(taken, (item,)), 0, 1.0)
+    document = edits.set_share(Document(taken, (item,)), 0, "defocus", 1.0)
     item, puppet = document.objects[0], puppet_of(item, camera)
     lighting, blurs = Lighting(document), []
     for step in STEPS:

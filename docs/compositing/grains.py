@@ -83,7 +83,7 @@ def _of(name: str) -> list[Grained]:
     cases = []
     for place, placement in PLACES.items():
         moved = edits.set_placement(document, 0, placement)
-        found = [composite(d).pixels for d in (moved, edits.set_grain(moved, 0, 1.0))]
+        found = [composite(d).pixels for d in (moved, edits.set_share(moved, 0, "grain", 1.0))]
         plain, grained = (tuple(_powers(p[SEEN].astype(float)) / wanted) for p in found)
         here = pixels[148:212, 118:182]
         pictures = (here, found[0][SEEN], found[1][SEEN])

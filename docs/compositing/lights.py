@@ -16,7 +16,7 @@ from objectmorpher_core.compose.light.lighting import estimate_light, object_tex
 from objectmorpher_core.compose.light.relight import relight
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import LiftSettings, Placement
-from objectmorpher_core.document.settings import USUAL_RELIGHT, DeformSettings
+from objectmorpher_core.document.settings import USUAL_SHARES, DeformSettings
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster import tiles
 
@@ -68,7 +68,7 @@ def _under(name: str, meshes: Path, lamp: Lamp) -> list[Turned]:
             splats = puppet.posed(None, place)
             picture = tiles.draw(tiles.prepare(splats, CAMERA, CAMERA), texture)
             colour = picture.color
-            relit = relight(splats, light, USUAL_RELIGHT, CAMERA) if is_relit else None
+            relit = relight(splats, light, USUAL_SHARES["relight"], CAMERA) if is_relit else None
             if relit is not None:
                 colour = relit.lit(colour, picture.alpha, 0, 0)
             alpha = np.asarray(picture.alpha, np.float64)

@@ -22,7 +22,7 @@ from objectmorpher_core.base.arrays import F64, Pixels, pixels_from_unit
 from objectmorpher_core.compose.light.harmonize import at_strength, light_gain, light_map
 from objectmorpher_core.compose.silhouette import Silhouette
 from objectmorpher_core.document.model import Document, Photo
-from objectmorpher_core.document.settings import USUAL_HARMONY
+from objectmorpher_core.document.settings import USUAL_SHARES
 from objectmorpher_core.pictures.image import Picture, encode_picture
 
 SIZE = 150  # px, of the object's square
@@ -111,7 +111,7 @@ def measured(meshes: Path) -> list[Moved]:
                 for start, end in ((LEFT, RIGHT), (RIGHT, LEFT)):
                     shape = Silhouette(alpha.astype(np.float32), start, TOP, 1.0)
                     gain = light_gain(seen, SIDE, shape, replace(shape, left=end))
-                    harmony = np.array(at_strength(gain, USUAL_HARMONY))
+                    harmony = np.array(at_strength(gain, USUAL_SHARES["harmony"]))
                     before, after = (
                         np.clip(linear * _at(field, left), 0, 1) ** (1 / GAMMA)
                         for left in (start, end)

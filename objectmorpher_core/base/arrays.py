@@ -35,6 +35,16 @@ def frozen(array: np.ndarray, dtype: npt.DTypeLike | None = None) -> np.ndarray:
     return array
 
 
+def freeze(owner: object, **dtypes: npt.DTypeLike | None) -> None:
+    """Make the named arrays of a frozen dataclass read-only, as `frozen` does.
+
+    A field that is None stays None; a dtype of None leaves the array's own.
+    """
+    for name, dtype in dtypes.items():
+        if (array := getattr(owner, name)) is not None:
+            object.__setattr__(owner, name, frozen(array, dtype))
+
+
 def _is_frozen(array: np.ndarray) -> bool:
     if type(array) is not np.ndarray or array.ndim == 0:
         return False

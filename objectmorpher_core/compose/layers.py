@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import crop, pixels_from_unit
+from ..base.masks import box_of
 from ..base.progress import Progress, part, silent
 from ..document.bounds import NORMAL
 from ..document.model import Document, EditObject, Matte, Plate
@@ -133,14 +134,12 @@ def _clipped(name: str, pixels: np.ndarray, own: Box, size: tuple[int, int]) -> 
 
 def _trimmed(name: str, pixels: np.ndarray, box: Box) -> list[Layer]:
     """Without the rows and columns at its sides that are clear; none where all of it is."""
-    there = pixels[..., 3] > 0
-    rows, columns = np.flatnonzero(there.any(1)), np.flatnonzero(there.any(0))
-    if not len(rows):
+    x0, y0, x1, y1 = box_of(pixels[..., 3])
+    if x0 == x1:
         return []
-    top, left = int(rows[0]), int(columns[0])
-    inner = pixels[top : rows[-1] + 1, left : columns[-1] + 1].copy()
+    inner = pixels[y0:y1, x0:x1].copy()
     inner[inner[..., 3] == 0] = 0
-    return [Layer(name, inner, box[0] + left, box[1] + top)]
+    return [Layer(name, inner, box[0] + x0, box[1] + y0)]
 
 
 def _untouched(document: Document, result: Composite, pile: list[Layer]) -> list[Layer]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.arrays import F32, F64, Mask
 from ..base.camera import Camera
+from ..base.masks import box_of
 from ..raster.posed import PosedSplats
 from .blend import Box
 
@@ -159,11 +160,11 @@ def cells_bounds(
 
     The grid's `corner` is at photo px.
     """
-    rows, columns = np.flatnonzero(values.any(1)), np.flatnonzero(values.any(0))
-    if not len(rows):
+    left, top, right, bottom = box_of(values)
+    if left == right:
         return 0, 0, 0, 0
-    x0, x1 = (corner[0] + pitch * (c + d) for c, d in ((columns[0], -1), (columns[-1], 2)))
-    y0, y1 = (corner[1] + pitch * (r + d) for r, d in ((rows[0], -1), (rows[-1], 2)))
+    x0, x1 = (corner[0] + pitch * column for column in (left - 1, right + 1))
+    y0, y1 = (corner[1] + pitch * row for row in (top - 1, bottom + 1))
     width, height = size
     return (
         int(np.clip(np.floor(x0), 0, width)), int(np.clip(np.floor(y0), 0, height)),

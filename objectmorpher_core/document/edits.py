@@ -29,14 +29,12 @@ from .rig import Rig, Seam
 from .settings import (
     LEAST_FEATHER,
     MOST_FEATHER,
-    USUAL_DEFOCUS,
-    USUAL_GRAIN,
-    USUAL_HARMONY,
-    USUAL_RELIGHT,
+    USUAL_SHARES,
     Finish,
     Hint,
     Refined,
     Shadow,
+    Share,
 )
 
 SAME_THING = 0.15  # IoU of two masks, below which they are of two things
@@ -263,10 +261,9 @@ def add_handle(
 
 def move_handle(document: Document, k: int, h: int, target: np.ndarray) -> Document:
     """Handle `h` of object `k` must be at `target` (3,), object frame."""
-    item = document.objects[k]
-    moved = replace(item.handles[h], target=np.asarray(target, dtype=np.float64))
-    handles = tuple(moved if i == h else other for i, other in enumerate(item.handles))
-    return document.with_object(k, replace(item, handles=handles))
+    handle = document.objects[k].handles[h]
+    target = np.asarray(target, dtype=np.float64)
+    return _with_handle(document, k, h, replace(handle, target=target))
 
 
 def remove_handle(document: Document, k: int, h: int) -> Document:
@@ -278,27 +275,26 @@ def remove_handle(document: Document, k: int, h: int) -> Document:
 
 def turn_handle(document: Document, k: int, h: int, turn: np.ndarray | None) -> Document:
     """Handle `h` of object `k` is turned by `turn` (3,), a rotation vector; None: as it comes."""
-    item = document.objects[k]
-    turned = replace(item.handles[h], turn=turn)
-    handles = tuple(turned if i == h else other for i, other in enumerate(item.handles))
-    return document.with_object(k, replace(item, handles=handles))
+    return _with_handle(document, k, h, replace(document.objects[k].handles[h], turn=turn))
 
 
 def set_pin(document: Document, k: int, h: int, is_pin: bool) -> Document:
     """Whether handle `h` of object `k` is there to hold, or to be dragged and to turn freely."""
     item = document.objects[k]
-    changed = item.handles[h].pinned(is_pin, item.pose)
-    handles = tuple(changed if i == h else other for i, other in enumerate(item.handles))
-    return document.with_object(k, replace(item, handles=handles))
+    return _with_handle(document, k, h, item.handles[h].pinned(is_pin, item.pose))
 
 
 def soften_handle(document: Document, k: int, h: int, softness: float) -> Document:
     """Set how much handle `h` of object `k` gives way; 0 is not at all."""
     if not 0 <= softness < np.inf:
         raise EditError(f"a softness of {softness:g} is not 0 or more")
+    handle = document.objects[k].handles[h]
+    return _with_handle(document, k, h, replace(handle, softness=float(softness)))
+
+
+def _with_handle(document: Document, k: int, h: int, handle: Handle) -> Document:
     item = document.objects[k]
-    soft = replace(item.handles[h], softness=float(softness))
-    handles = tuple(soft if i == h else other for i, other in enumerate(item.handles))
+    handles = tuple(handle if i == h else other for i, other in enumerate(item.handles))
     return document.with_object(k, replace(item, handles=handles))
 
 
@@ -436,27 +432,13 @@ def set_shadow(document: Document, k: int, shadow: Shadow) -> Document:
     return _with_settings(document, k, "shadow", shadow)
 
 
-def set_harmony(document: Document, k: int, harmony: float) -> Document:
-    """Set how far object `k` takes on the light of its new place, in [0, 1]."""
-    return _with_share(document, k, "harmony", harmony)
+def set_share(document: Document, k: int, name: Share, share: float) -> Document:
+    """Set how far, in [0, 1], object `k` fits into its new place in one respect.
 
-
-def set_relight(document: Document, k: int, relight: float) -> Document:
-    """Set how far the light on object `k` stays in place while the object turns, in [0, 1]."""
-    return _with_share(document, k, "relight", relight)
-
-
-def set_grain(document: Document, k: int, grain: float) -> Document:
-    """Set how much of the lost grain object `k` is given, in [0, 1]."""
-    return _with_share(document, k, "grain", grain)
-
-
-def set_defocus(document: Document, k: int, defocus: float) -> Document:
-    """Set how far object `k` is blurred like the photo at its new depth, in [0, 1]."""
-    return _with_share(document, k, "defocus", defocus)
-
-
-def _with_share(document: Document, k: int, name: str, share: float) -> Document:
+    "harmony": it takes on the light there; "relight": the light stays in place while the object
+    turns; "grain": it is given the grain that it lost; "defocus": it is as blurred as the photo
+    is at its new depth.
+    """
     if not 0 <= share <= 1:
         what = "relighting" if name == "relight" else name
         raise EditError(f"a {what} of {share:g} is not between 0 and 1")
@@ -479,10 +461,9 @@ def _with_settings(document: Document, k: int, name: str, settings: Shadow | Fin
 def harmonised(document: Document, k: int, is_harmonised: bool = True) -> Document:
     """Object `k` in the light, grain and focus of its new place, or as it was in the photo."""
     share = 1.0 if is_harmonised else 0.0
-    document = set_harmony(document, k, share * USUAL_HARMONY)
-    document = set_relight(document, k, share * USUAL_RELIGHT)
-    document = set_grain(document, k, share * USUAL_GRAIN)
-    return set_defocus(document, k, share * USUAL_DEFOCUS)
+    for name, usual in USUAL_SHARES.items():
+        document = set_share(document, k, name, share * usual)
+    return document
 
 
 def set_feather(document: Document, feather: float) -> Document:

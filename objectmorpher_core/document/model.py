@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import F32, F64, I32, U8, Mask, Pixels, Selection, frozen
+from ..base.arrays import F32, F64, I32, U8, Mask, Pixels, Selection, freeze, frozen
 from ..base.camera import Camera
 from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
@@ -110,8 +110,7 @@ class Matte:
     paint: Paint | None = None  # over it, where the artist has painted
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "alpha", frozen(self.alpha, np.float32))
-        object.__setattr__(self, "foreground", frozen(self.foreground, np.float32))
+        freeze(self, alpha=np.float32, foreground=np.float32)
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -136,8 +135,7 @@ class PhotoTexture:
     solidity: F32  # (N,) in [0, 1], its alpha where the matte cannot be carried along
 
     def __post_init__(self) -> None:
-        for name in ("u0", "visibility", "solidity"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
+        freeze(self, u0=np.float32, visibility=np.float32, solidity=np.float32)
 
 
 @dataclass(frozen=True)
@@ -183,10 +181,7 @@ class LiftSettings:
             raise ValueError(f"a trust of {self.trust:g} is not between 0 and 1")
         if len(self.views) > MOST_VIEWS:
             raise ValueError(f"{len(self.views)} further photos are more than {MOST_VIEWS}")
-        if self.hidden is not None:
-            object.__setattr__(self, "hidden", frozen(self.hidden, np.bool_))
-        if self.nearness is not None:
-            object.__setattr__(self, "nearness", frozen(self.nearness, np.float32))
+        freeze(self, hidden=np.bool_, nearness=np.float32)
 
 
 AS_SEEN = LiftSettings()
@@ -219,10 +214,8 @@ class LiftedObject:
     origin: Origin | None = None  # None: the document's own photo
 
     def __post_init__(self) -> None:
-        if self.middle is not None:
-            object.__setattr__(self, "middle", frozen(self.middle, np.float32))
-        object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))
-        object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
+        freeze(self, middle=np.float32, control_points=np.float32)
+        freeze(self, world_from_object=np.float64)
         if self.up is not None and not abs(np.linalg.norm(self.up) - 1) < UNIT:
             raise ValueError(f"what is up is {self.up}, not a direction of the length 1")
         if self.splatting not in SPLATTINGS:
@@ -501,10 +494,7 @@ class Plate:
     painted: Mask | None = None  # (h, w) repaired by hand: shown wherever something has moved
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", frozen(self.pixels))
-        object.__setattr__(self, "hole", frozen(self.hole, np.bool_))
-        if self.painted is not None:
-            object.__setattr__(self, "painted", frozen(self.painted, np.bool_))
+        freeze(self, pixels=None, hole=np.bool_, painted=np.bool_)
 
     @property
     def box(self) -> tuple[int, int, int, int]:

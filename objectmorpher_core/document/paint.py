@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F32, U8, Mask, crop, frozen
+from ..base.arrays import F32, U8, Mask, crop, freeze
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 SIDE = 512  # px, of a tile
@@ -23,7 +23,7 @@ class PaintTile:
     rgba: U8  # (SIDE, SIDE, 4) sRGB, straight
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rgba", frozen(self.rgba, np.uint8))
+        freeze(self, rgba=np.uint8)
 
     @property
     def box(self) -> Box:
@@ -44,9 +44,7 @@ class Paint:
     apart: Mask | None = None  # (N,) which of them do not show the texture any more; None: none
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "spots", frozen(self.spots, np.uint8))
-        if self.apart is not None:
-            object.__setattr__(self, "apart", frozen(self.apart, np.bool_))
+        freeze(self, spots=np.uint8, apart=np.bool_)
 
     def crop(self, box: Box) -> U8:
         """(h, w, 4) what of it lies in a box of the texture, px of the photo."""

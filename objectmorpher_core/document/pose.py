@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F64, I32, frozen
+from ..base.arrays import F64, I32, freeze
 from ..base.rotations import vector_from_matrix
 
 
@@ -22,10 +22,7 @@ class Handle:
     softness: float = 0.0  # 0: met exactly; 1: gives as much as the object itself does
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", frozen(self.point, np.float64))
-        object.__setattr__(self, "target", frozen(self.target, np.float64))
-        if self.turn is not None:
-            object.__setattr__(self, "turn", frozen(self.turn, np.float64))
+        freeze(self, point=np.float64, target=np.float64, turn=np.float64)
 
     @property
     def turned(self) -> F64:
@@ -48,8 +45,7 @@ class Pose:
     rotations: F64  # (M, 3, 3)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen(self.points, np.float64))
-        object.__setattr__(self, "rotations", frozen(self.rotations, np.float64))
+        freeze(self, points=np.float64, rotations=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +61,7 @@ class Base:
     anchors: I32 | None = None  # control points that stay as they are in it; None: chosen anew
 
     def __post_init__(self) -> None:
-        if self.anchors is not None:
-            object.__setattr__(self, "anchors", frozen(self.anchors, np.int32))
+        freeze(self, anchors=np.int32)
 
     @property
     def is_usual(self) -> bool:

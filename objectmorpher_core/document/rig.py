@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import F64, I32, frozen
+from ..base.arrays import F64, I32, freeze, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,8 +18,7 @@ class Seam:
     is_glued: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "first", frozen(self.first, np.int32))
-        object.__setattr__(self, "second", frozen(self.second, np.int32))
+        freeze(self, first=np.int32, second=np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +33,7 @@ class Rig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bodies", tuple(frozen(b, np.int32) for b in self.bodies))
-        if self.held is not None:
-            object.__setattr__(self, "held", frozen(self.held, np.int32))
-        if self.shifts is not None:
-            object.__setattr__(self, "shifts", frozen(self.shifts, np.float64))
-        if self.stiffness is not None:
-            object.__setattr__(self, "stiffness", frozen(self.stiffness, np.float64))
+        freeze(self, held=np.int32, shifts=np.float64, stiffness=np.float64)
 
     def is_held(self, node: int) -> bool:
         """Whether a control point is frozen."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Literal
 
 import numpy as np
 
@@ -38,8 +39,9 @@ class Hint:
 # How a moved object is joined to the photo, in numbers that the artist chooses.
 
 MOST_SHADOW = 4.0  # x the object's height, length of its shadow
+Share = Literal["harmony", "relight", "grain", "defocus"]
 # Of an object that is harmonised.
-USUAL_HARMONY, USUAL_RELIGHT, USUAL_GRAIN, USUAL_DEFOCUS = 0.8, 0.75, 1.0, 1.0
+USUAL_SHARES: dict[Share, float] = {"harmony": 0.8, "relight": 0.75, "grain": 1.0, "defocus": 1.0}
 LEAST_FEATHER, MOST_FEATHER = 0.25, 3.0  # x the usual width of the blend
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F32, F64, U8, Mask, frozen
+from ..base.arrays import F32, F64, U8, Mask, freeze
 from ..base.camera import Camera
 
 MOST_MATCHES = 20_000  # between two photos
@@ -30,11 +30,8 @@ class Sides:
     real: Mask | None = None  # (N,) whose picture is of a further photo; None: all are invented
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", frozen(self.pixels, np.uint8))
-        if self.real is not None:
-            object.__setattr__(self, "real", frozen(self.real, np.bool_))
-        for name in ("at", "slopes", "zoom"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
+        freeze(self, pixels=np.uint8, real=np.bool_)
+        freeze(self, at=np.float32, slopes=np.float32, zoom=np.float32)
 
     def select(self, index: np.ndarray) -> Sides:
         """Of the Gaussians at `index` (integers or booleans)."""
@@ -81,10 +78,7 @@ class FurtherView:
     matches: F32  # (n, 4) px of the first photo, and of this one, that show the same detail
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pose", frozen(self.pose, np.float64))
-        object.__setattr__(self, "pixels", frozen(self.pixels, np.uint8))
-        object.__setattr__(self, "alpha", frozen(self.alpha, np.uint8))
-        object.__setattr__(self, "matches", frozen(self.matches, np.float32))
+        freeze(self, pose=np.float64, pixels=np.uint8, alpha=np.uint8, matches=np.float32)
         self._check()
 
     @property

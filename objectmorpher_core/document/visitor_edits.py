@@ -17,7 +17,7 @@ from ..base.camera import Camera
 from .edits import free_name
 from .model import Document, EditObject, LiftedObject, Origin, Placement, Prompt
 from .placement import Ground, GroundError, centre_of, down_of, ground_under, with_centre
-from .settings import USUAL_HARMONY
+from .settings import USUAL_SHARES
 
 MOST = 0.6  # of the photo's width and height, that an object takes at most when it comes
 KEPT = ("mask", "coverage", "matte", "lifted", "prompt", "found", "mixed", "stays_in_front")
@@ -51,7 +51,7 @@ def arrived(
     if name in (taken := {o.name for o in document.objects}):
         name = free_name(name, taken)
     nowhere = frozen(np.zeros(document.photo.size[::-1], bool))
-    visitor = replace(visitor, name=name, mask=nowhere, harmony=USUAL_HARMONY)
+    visitor = replace(visitor, name=name, mask=nowhere, harmony=USUAL_SHARES["harmony"])
     origin = lifted.origin
     assert origin is not None
     own = centre_of(visitor.placement, lifted, origin.camera)

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ..base.arrays import F32, U8, Mask, Pixels, Selection
+from ..base.masks import box_of
 from ..base.progress import silent
 from ..compose.plate.completion import complete, shrunk, smooth
 from ..compose.plate.patch_detail import with_detail
@@ -53,8 +54,8 @@ def with_beyond(matte: Matte, size: tuple[int, int]) -> Matte:
         return matte
     away = cv2.distanceTransform((~(beyond & shown)).astype(np.uint8), cv2.DIST_L2, 5)
     near = (away < AROUND * depth) & shown
-    rows, columns = np.flatnonzero(near.any(1)), np.flatnonzero(near.any(0))
-    window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    x0, y0, x1, y1 = box_of(near)
+    window = np.s_[y0:y1, x0:x1]
     made = _filled(matte.foreground[window], matte.alpha[window], beyond[window], depth)
     if made is None:
         return matte

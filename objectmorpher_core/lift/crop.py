@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.arrays import F32, F64, RGB, Mask, Pixels
 from ..base.camera import Camera
+from ..base.masks import box_of
 from ..pictures.image import to_u8
 
 SIDE = 224  # px of a crop as it is seen
@@ -31,8 +32,7 @@ class Crop(NamedTuple):
     @staticmethod
     def around(mask: Mask, camera: Camera) -> Crop:
         """Around what `mask` (H, W) holds, which is something."""
-        rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-        low, high = np.array([columns[0], rows[0]]), np.array([columns[-1], rows[-1]]) + 1
+        low, high = np.array(box_of(mask)).reshape(2, 2)
         side = int(np.ceil(ROOM * (high - low).max()))
         left, top = 0.5 * (low + high - side)
         return Crop.at(float(left), float(top), side, camera)

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from PIL import Image, ImageCms
 
-from ..base.arrays import RGB, U8, Mask, Pixels, frozen
+from ..base.arrays import RGB, U8, Mask, Pixels, freeze
 from ..base.library_output import logged_output
 from ..base.limits import PICTURE_PIXELS as MAX_PIXELS
 from . import exif, guests, png, tiff
@@ -117,9 +117,7 @@ class Picture:
     focal_35mm: float | None = None  # mm, EXIF's 35-mm equivalent focal length
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", frozen(self.pixels))
-        if self.alpha is not None:
-            object.__setattr__(self, "alpha", frozen(self.alpha))
+        freeze(self, pixels=None, alpha=None)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from ..base.arrays import RGB, Mask, Selection
+from ..base.masks import box_of
 from ..document.model import BesidePrompt, Prompt
 
 SMALLEST = 16  # px; less is no object
@@ -85,14 +86,8 @@ def _alone(prompt: Prompt) -> Prompt:
 
 def box_around(selection: Selection, px: float) -> tuple[slice, slice] | None:
     """The box around what is selected, `px` larger, inside the photo; None for nothing."""
-    rows, columns = np.flatnonzero(selection.any(1)), np.flatnonzero(selection.any(0))
-    if len(rows) == 0:
-        return None
-    reach, (height, width) = int(np.ceil(px)), selection.shape
-    return (
-        slice(max(int(rows[0]) - reach, 0), min(int(rows[-1]) + reach + 1, height)),
-        slice(max(int(columns[0]) - reach, 0), min(int(columns[-1]) + reach + 1, width)),
-    )
+    x0, y0, x1, y1 = box_of(selection, int(np.ceil(px)))
+    return None if x0 == x1 else np.s_[y0:y1, x0:x1]
 
 
 def keep_touched(mask: Mask, prompt: Prompt) -> Mask:

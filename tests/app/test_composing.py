@@ -21,10 +21,7 @@ from objectmorpher_core.compose.shadow.shadow import Shade
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.document.settings import (
-    USUAL_DEFOCUS,
-    USUAL_GRAIN,
-    USUAL_HARMONY,
-    USUAL_RELIGHT,
+    USUAL_SHARES,
     Finish,
     Shadow,
 )
@@ -343,15 +340,14 @@ def test_harmonise_offers_both_lights_and_grain_and_one_step_takes_all(
     editor.start(edits.set_placement(ball, 0, Placement(turn=(25.0, 0.0, 0.0))))
     editor.composing.choose_refiner("harmonise")
     assert editor.object is not None
-    assert editor.object.harmony == USUAL_HARMONY and editor.object.relight == USUAL_RELIGHT
-    assert editor.object.grain == USUAL_GRAIN and editor.object.defocus == USUAL_DEFOCUS
-    editor.composing.preview_harmony(0.0)
+    assert all(getattr(editor.object, name) == usual for name, usual in USUAL_SHARES.items())
+    editor.composing.preview_share("harmony", 0.0)
     editor.commit("Adjust light")
-    editor.composing.preview_relight(0.0)
+    editor.composing.preview_share("relight", 0.0)
     editor.commit("Adjust light")
-    editor.composing.preview_grain(0.0)
+    editor.composing.preview_share("grain", 0.0)
     editor.commit("Adjust light")
-    editor.composing.preview_defocus(0.0)
+    editor.composing.preview_share("defocus", 0.0)
     assert editor.object.relight == 0 and editor.object.grain == 0 and editor.object.defocus == 0
     assert editor.composing.refiner == "harmonise"  # until the pointer is let go
     editor.commit("Adjust light")
@@ -363,7 +359,7 @@ def test_the_canvas_shows_the_light_that_stays(editor: Editor, ball: Document) -
     editor.start(turned)
     editor.cache.frame_time = np.inf  # one frame, exact
     plain = build_frame(turned, editor.view, editor.cache).layers[0]
-    lit = edits.set_relight(turned, 0, 1.0)
+    lit = edits.set_share(turned, 0, "relight", 1.0)
     relit = build_frame(lit, editor.view, editor.cache).layers[0]
     again = build_frame(lit, editor.view, editor.cache).layers[0]
     editor.cache.frame_time = FRAME

@@ -37,7 +37,7 @@ def pair(ball: Document) -> Document:
     for k, across in enumerate((-12.0, 30.0)):
         document = edits.set_placement(document, k, Placement(move=(across, 6.0)))
         document = edits.set_shadow(document, k, Shadow(strength=0.6))
-        document = edits.set_relight(edits.set_harmony(document, k, 1.0), k, 0.5)
+        document = edits.set_share(edits.set_share(document, k, "harmony", 1.0), k, "relight", 0.5)
     return document
 
 

@@ -125,7 +125,7 @@ def test_it_goes_when_the_focus_changes(moved, monkeypatch):
     asked = Asked(moved, monkeypatch)
     moved.refining.run()
     asked.answer()
-    assert edits.set_defocus(moved.document, 0, 1.0).refined is None
+    assert edits.set_share(moved.document, 0, "defocus", 1.0).refined is None
 
 
 def test_without_a_model_a_sentence_says_where_to_get_one(moved):

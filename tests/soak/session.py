@@ -211,7 +211,7 @@ class Session:
     def _light(self) -> None:
         document = self.editor.document
         harmony = self._chance.random()
-        self.editor.apply("Harmony", edits.set_harmony(document, 0, harmony))
+        self.editor.apply("Harmony", edits.set_share(document, 0, "harmony", harmony))
 
     def _unpick(self) -> None:
         self.editor.objects.choose(0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from objectmorpher_core.base.arrays import F64
@@ -21,21 +23,18 @@ class MaskTool:
         is_erasing = erases(editor, pointer)
         if editor.view.selecting.painted is Painted.EDGE:
             is_painting = editor.edging.start_stroke(pointer, is_erasing)
-            return _find_edge(editor) if is_painting else ignore()
+            edge = editor.edging
+            dragged = _dragged(edge.move_stroke, edge.finish_stroke, edge.drop_stroke)
+            return dragged if is_painting else ignore()
         if editor.view.selecting.painted is not Painted.SELECTION:
             is_painting = editor.shaping.start_stroke(is_erasing)
             return _paint(editor.shaping, pointer) if is_painting else ignore()
         return self._select(editor, pointer, is_erasing)
 
     def _select(self, editor: Editor, pointer: Pointer, is_erasing: bool) -> Stroke:
-        editor.masking.start_stroke(pointer, is_erasing)
-        try:
-            while (pointer := (yield)).is_down:
-                editor.masking.move_stroke(pointer)
-            label = t("Erase selection") if is_erasing else t("Paint selection")
-            editor.masking.finish_stroke(label)
-        finally:
-            editor.masking.drop_stroke()
+        mask, label = editor.masking, t("Erase selection") if is_erasing else t("Paint selection")
+        mask.start_stroke(pointer, is_erasing)
+        yield from _dragged(mask.move_stroke, partial(mask.finish_stroke, label), mask.drop_stroke)
 
     def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         return PointerShape.CROSS if editor.is_on_photo(pointer.xy) else PointerShape.ARROW
@@ -55,14 +54,16 @@ class MaskTool:
         return t("Drag paints · Right-drag or Alt erases · Shift-click draws a line · [ ] size")
 
 
-def _find_edge(editor: Editor) -> Stroke:
-    """A stroke along the edge, which is found anew under it."""
+def _dragged(
+    move: Callable[[Pointer], None], end: Callable[[], None], drop: Callable[[], None]
+) -> Stroke:
+    """A stroke that goes with the pointer until the button is up."""
     try:
         while (pointer := (yield)).is_down:
-            editor.edging.move_stroke(pointer)
-        editor.edging.finish_stroke()
-    finally:
-        editor.edging.drop_stroke()
+            move(pointer)
+        end()
+    finally:  # Esc closes the stroke where it waits
+        drop()
 
 
 class _Painted(Protocol):
@@ -76,13 +77,8 @@ class _Painted(Protocol):
 
 
 def _paint(painted: _Painted, pointer: Pointer) -> Stroke:
-    try:
-        painted.paint(pointer.xy)
-        while (pointer := (yield)).is_down:
-            painted.paint(pointer.xy)
-        painted.end_stroke()
-    finally:  # Esc closes the stroke where it waits
-        painted.drop_stroke()
+    painted.paint(pointer.xy)
+    yield from _dragged(lambda p: painted.paint(p.xy), painted.end_stroke, painted.drop_stroke)
 
 
 def erases(editor: Editor, pointer: Pointer) -> bool:
@@ -114,18 +110,12 @@ class ComposeTool:
             if is_other:
                 editor.hinting.remove_at(pointer.xy)
                 return ignore()
-            return self._take(editor) if editor.hinting.start(pointer.xy) else ignore()
+            hint = editor.hinting
+            dragged = _dragged(lambda p: hint.move_to(p.xy), hint.finish, hint.drop)
+            return dragged if hint.start(pointer.xy) else ignore()
         if not editor.composing.start_stroke(is_other):
             return ignore()
         return _paint(editor.composing, pointer)
-
-    def _take(self, editor: Editor) -> Stroke:
-        try:
-            while (pointer := (yield)).is_down:
-                editor.hinting.move_to(pointer.xy)
-            editor.hinting.finish()
-        finally:
-            editor.hinting.drop()
 
     def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         view = editor.view.compose

@@ -26,6 +26,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, F64, U8, unit_pixels
+from ...base.masks import dilated
 from ...document.model import Document
 from ..shadow.shadow import GAMMA
 from ..silhouette import Silhouette, sampled
@@ -197,8 +198,7 @@ def _around(light: F32, width: int, shape: Silhouette) -> _Around | None:
     if not covered.any():
         return None
     reach = max(round(RING * max(shape.alpha.shape) * shape.pitch / pitch), 1)
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    around = cv2.dilate(covered.astype(np.uint8), kernel) > 0
+    around = dilated(covered, reach)
     places = np.argwhere(around)[:, ::-1].astype(np.float64)
     colours = light[around].astype(np.float64)
     mean = _mean(colours)

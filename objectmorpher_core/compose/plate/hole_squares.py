@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, Mask, Pixels, pixels_from_unit, unit_pixels
+from ...base.masks import box_of
 from ...base.progress import Progress, part, silent
 from .. import InpaintError
 from .completion import smooth, sources_like
@@ -96,16 +97,14 @@ def fill_squares(
 def _box(own: Mask, side: int) -> tuple[int, int, int, int]:
     """Of the square around a hole, as far as the photo reaches."""
 
-    def reach(there: Mask, wanted: int) -> tuple[int, int]:
-        inside, size = np.flatnonzero(there), len(there)
-        wanted = min(wanted, size)
-        start = int(np.clip((inside[0] + inside[-1] + 1 - wanted) // 2, 0, size - wanted))
-        return start, start + wanted
+    def reach(first: int, last: int, size: int) -> tuple[int, int]:
+        length = min(wanted, size)
+        start = int(np.clip((first + last - length) // 2, 0, size - length))
+        return start, start + length
 
-    rows, columns = np.asarray(own.any(1)), np.asarray(own.any(0))
-    longer = max(np.ptp(np.flatnonzero(rows)), np.ptp(np.flatnonzero(columns))) + 1
-    wanted = max(side, round(SURROUNDINGS * float(longer)))
-    (y0, y1), (x0, x1) = reach(rows, wanted), reach(columns, wanted)
+    x0, y0, x1, y1 = box_of(own)
+    wanted = max(side, round(SURROUNDINGS * max(x1 - x0, y1 - y0)))
+    (y0, y1), (x0, x1) = reach(y0, y1, own.shape[0]), reach(x0, x1, own.shape[1])
     return x0, y0, x1, y1
 
 

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, RGB, Mask, Pixels, crop, pixels_from_unit, unit_pixels
+from ...base.masks import box_of, dilated
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Plate
 from ...pictures.image import to_u8
@@ -74,8 +75,7 @@ def fill_patch(
     """
     painted = patch.coverage > 0
     rim = max(round(RIM * margin), 2)
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * rim + 1, 2 * rim + 1))
-    hole = cv2.dilate(painted.astype(np.uint8), kernel) > 0
+    hole = dilated(painted, rim)
     if hole.all():
         hole = painted
     filled = inpainter.inpaint(patch.pixels, hole, part(progress, 0.0, 0.9), seed)
@@ -232,12 +232,8 @@ def _grown(plate: Plate, photo: Pixels, box: Box) -> _Grown:
 
 def _bounds(there: Mask, box: Box) -> Box:
     """Px of the photo around what is `there` in the `box`."""
-    rows, columns = np.flatnonzero(there.any(1)), np.flatnonzero(there.any(0))
-    left, top = box[:2]
-    return (
-        left + int(columns[0]), top + int(rows[0]),
-        left + int(columns[-1]) + 1, top + int(rows[-1]) + 1,
-    )  # fmt: skip
+    (left, top), (x0, y0, x1, y1) = box[:2], box_of(there)
+    return left + x0, top + y0, left + x1, top + y1
 
 
 def _shared(grown: _Grown, box: Box) -> Box:

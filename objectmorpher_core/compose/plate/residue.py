@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
+from ...base.masks import box_of, disc
 from ...document.model import Document, EditObject, Matte, Placement, Plate
 from ...document.placement import is_in_place
 
@@ -56,14 +57,9 @@ def find_residue(pixels: Pixels, covered: Mask, margin: float) -> Mask:
 
     `margin` is the photo's `hole_margin`, px.
     """
-    height, width = covered.shape
     reach, found = REACH * margin, np.zeros_like(covered)
-    rows, columns = np.flatnonzero(covered.any(1)), np.flatnonzero(covered.any(0))
-    pad = int((AROUND + 0.1) * reach) + 2
-    window = (
-        slice(max(rows[0] - pad, 0), min(rows[-1] + 1 + pad, height)),
-        slice(max(columns[0] - pad, 0), min(columns[-1] + 1 + pad, width)),
-    )
+    x0, y0, x1, y1 = box_of(covered, int((AROUND + 0.1) * reach) + 2)
+    window = np.s_[y0:y1, x0:x1]
     part, own = pixels[window], covered[window]
     scale = min(1.0, max(SIDE / max(own.shape), LEAST_REACH / reach))
     size = (max(round(own.shape[1] * scale), 1), max(round(own.shape[0] * scale), 1))
@@ -376,7 +372,6 @@ def with_parts(mask: Mask, document: Document, parts: Sequence[Ghost], margin: f
         grown[inner] |= part.there & (cv2.blur(unlike, (3, 3)) > 2 * VISIBLE)
     added = grown & ~mask
     reach = int(np.ceil(margin)) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    joined = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, kernel) > 0
-    near = cv2.dilate(added.astype(np.uint8), kernel) > 0
-    return grown | (joined & near)
+    near = disc(reach)
+    joined = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, near) > 0
+    return grown | (joined & (cv2.dilate(added.astype(np.uint8), near) > 0))

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, F64, RGB, U8, Pixels, pixels_from_unit, unit_pixels
+from ...base.masks import box_of
 from ...base.progress import Progress, part
 from ...document.settings import Refined
 from ...pictures.image import to_u8
@@ -279,15 +280,11 @@ def refine(
 
 def crop_box(box: Box, weights: F32, size: tuple[int, int]) -> Box:
     """Around what is shown of the edit, with context, inside the photo of `size`."""
-    rows, columns = np.flatnonzero(weights.any(1)), np.flatnonzero(weights.any(0))
-    ends = []
-    for first, last, start, most in (
-        (columns[0], columns[-1] + 1, box[0], size[0]),
-        (rows[0], rows[-1] + 1, box[1], size[1]),
-    ):
-        length = int(last - first)
+    shown, ends = box_of(weights), []
+    for first, last, start, most in zip(shown[:2], shown[2:], box[:2], size, strict=True):
+        length = last - first
         margin = max(int(CONTEXT * length), LEAST_CONTEXT, (LEAST_SIDE - length + 1) // 2)
-        ends.append((max(start + int(first) - margin, 0), min(start + int(last) + margin, most)))
+        ends.append((max(start + first - margin, 0), min(start + last + margin, most)))
     (x0, x1), (y0, y1) = ends
     return x0, y0, x1, y1
 

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
+from ...base.masks import disc
 from ...base.progress import Progress, silent
 from ...document.model import Plate
 from ...document.settings import Hint, Shadow
@@ -220,9 +221,8 @@ def _from_edge(missing: F32, pitch: float) -> F32:
     """(h, w) px from the edge, less than 0 in the shadow; all 0 where there is none."""
     height, width = missing.shape
     scale = min(FEW / pitch, 1.0)
-    side = 2 * round(NEAR_BY * pitch * scale) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    deepest = cv2.resize(cv2.dilate(_shrunk(missing, scale), kernel), (width, height))
+    near = disc(round(NEAR_BY * pitch * scale))
+    deepest = cv2.resize(cv2.dilate(_shrunk(missing, scale), near), (width, height))
     is_shade = missing > np.maximum(HALF * deepest, SEEN_EDGE)
     if not is_shade.any() or is_shade.all():
         return np.zeros_like(missing)

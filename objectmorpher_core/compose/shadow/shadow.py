@@ -23,6 +23,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64
 from ...base.camera import Camera
+from ...base.masks import box_of
 from ...document.settings import Shadow
 from ..blend import Box
 from ..silhouette import SilhouetteGrid, box_around, sampled
@@ -315,9 +316,8 @@ def opacity(shadow: Shadow, far: F32, near: F32 | float) -> F32:
 
 def trimmed(alpha: F32, grid: SilhouetteGrid, colour: tuple[float, float, float]) -> Shade | None:
     """A shadow (h, w) as a picture that ends clear; None where all of it is."""
-    rows, columns = np.flatnonzero(alpha.any(1)), np.flatnonzero(alpha.any(0))
-    if not len(rows):
+    x0, y0, x1, y1 = box_of(alpha)
+    if x0 == x1:
         return None
-    alpha = np.pad(alpha[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], 1)
-    left, top = grid.left + grid.pitch * (columns[0] - 1), grid.top + grid.pitch * (rows[0] - 1)
-    return Shade(alpha, float(left), float(top), grid.pitch, colour)
+    left, top = grid.left + grid.pitch * (x0 - 1), grid.top + grid.pitch * (y0 - 1)
+    return Shade(np.pad(alpha[y0:y1, x0:x1], 1), left, top, grid.pitch, colour)

@@ -24,6 +24,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, F64, Mask, Pixels, unit_pixels
+from ...base.masks import box_of, disc
 from ...document.model import Matte
 from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, OldShadow, edge_blur
@@ -333,12 +334,13 @@ def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
 def surroundings(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> Surroundings:
     """Look around what was cut out. Raises ValueError where it is thinner than a cell."""
     height, width = pixels.shape[:2]
-    rows, columns = (np.flatnonzero((matte.alpha > 0.5).any(axis)) for axis in (1, 0))
-    size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
+    x0, y0, x1, y1 = box_of(matte.alpha > 0.5)
+    size = x1 - x0, y1 - y0
+    if min(size) == 0:
+        raise ValueError("nothing of it is solid")
     pitch = max(max(size) / CELLS, 1.0)
     around = int(AROUND * max(size) / pitch)
-    left = matte.left + columns[0] - around * pitch
-    top = matte.top + rows[0] - around * pitch
+    left, top = matte.left + x0 - around * pitch, matte.top + y0 - around * pitch
     cells = tuple(int(np.ceil(s / pitch)) + 2 * around for s in size)
 
     step = max(int(pitch) // LOOKED, 1)  # of a large photo not every pixel is looked at
@@ -536,9 +538,8 @@ def _spread(member: F32, dark: F32, thrown: F32, least: float, free: Mask) -> F3
     if own.sum() > MOST_GROWN * (member > 0.5).sum():  # it has run out over something dark
         return member
     ramp = np.where(own, np.clip((dark - 0.5 * least) / (0.5 * least), 0, 1), 0)
-    side = 2 * int(np.ceil(REACH)) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    grown = cv2.dilate(np.maximum(ramp.astype(np.float32), member), kernel)
+    near = disc(int(np.ceil(REACH)))
+    grown = cv2.dilate(np.maximum(ramp.astype(np.float32), member), near)
     return np.asarray(cv2.GaussianBlur(grown, (0, 0), REACH / 2), np.float32)
 
 

@@ -18,6 +18,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F64, U8, Mask, Pixels, Selection
 from ...base.camera import Camera
+from ...base.masks import box_of
 from ...base.progress import Progress, part, silent
 from ...document.bounds import MOST_VIEWS
 from ...document.model import LiftedObject, LiftSettings, Matte
@@ -66,10 +67,10 @@ class OtherPhoto:
 
     def shrunk(self, longest: int) -> OtherPhoto:
         """The same photo, so small that the object's longer side is `longest` px at most."""
-        rows, columns = (np.flatnonzero(is_selected(self.mask).any(axis)) for axis in (1, 0))
-        if not len(rows):
+        x0, y0, x1, y1 = box_of(is_selected(self.mask))
+        if x0 == x1:
             raise LiftError(f"no object is selected in {self.name}")
-        scale = longest / max(int(np.ptp(rows)) + 1, int(np.ptp(columns)) + 1)
+        scale = longest / max(x1 - x0, y1 - y0)
         if scale >= 1:
             return self
         height, width = self.mask.shape

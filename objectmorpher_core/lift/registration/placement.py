@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, frozen
+from ...base.arrays import F32, F64, freeze
 from ...base.camera import Camera
 from ...base.progress import Progress, part, silent
 from ...base.threads import core_count, in_threads
@@ -216,7 +216,7 @@ class Proposal:
     score: float  # IoU less colour error, and the support of matches if there are any
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
+        freeze(self, world_from_object=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

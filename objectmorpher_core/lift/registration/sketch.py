@@ -17,6 +17,7 @@ from scipy.spatial import KDTree
 from ...base.arrays import F32, F64, Mask, Pixels, frozen
 from ...base.camera import Camera
 from ...base.kernel_files import numba
+from ...base.masks import box_of
 from ...base.poisson_disk import thin_to_spacing
 from ...base.rotations import matrices_from_quats
 from ...base.threads import FAST
@@ -108,8 +109,7 @@ def alike(one: tuple[Pixels, Mask], other: tuple[Pixels, Mask]) -> tuple[F64, F6
 
 def _details(pixels: Pixels, mask: Mask) -> tuple[F64, F32]:
     """Where (n, 2) px they are, and what they look like (n, 128), of unit length."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    x0, x1, y0, y1 = columns[0], columns[-1] + 1, rows[0], rows[-1] + 1
+    x0, y0, x1, y1 = box_of(mask)
     side = (1 + 2 * MARGIN) * max(x1 - x0, y1 - y0)
     zoom = SIDE / side
     corner = 0.5 * np.array([x0 + x1 - side, y0 + y1 - side])

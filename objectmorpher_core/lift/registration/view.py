@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask, Pixels, crop, frozen, unit_pixels
 from ...base.camera import Camera
+from ...base.masks import box_of
 from ...base.rotations import matrix_from_vector
 from .. import LiftError
 from .sketch import COLOR, COVERAGE, NORMAL, Surfels, sketch
@@ -49,8 +50,7 @@ class Target:
     @property
     def box(self) -> tuple[int, int, int, int]:
         """x0, y0, x1, y1 px around the mask."""
-        rows, columns = np.flatnonzero(self.mask.any(1)), np.flatnonzero(self.mask.any(0))
-        return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+        return box_of(self.mask)
 
     @property
     def boxes(self) -> tuple[tuple[float, float, float, float], ...]:

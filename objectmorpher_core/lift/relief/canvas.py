@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask, crop, frozen
 from ...base.kernel_files import numba
+from ...base.masks import Box, box_of
 from ...base.poisson_disk import nearest_in
 from ...base.threads import LEAST_ROWS, in_threads
 from ...document.model import Matte
@@ -48,17 +49,10 @@ class ReliefCanvas:
         return ReliefCanvas(np.array(box[:2], np.float64), step, small[0], small[1], whole)
 
 
-Box = tuple[int, int, int, int]
-
-
 def _box_around(box: Box, hidden: Mask) -> tuple[Box, list[tuple[int, int]]]:
     """The box of the photo that holds `box` and `hidden` (H, W), and how much is added to it."""
-    rows, columns = np.flatnonzero(hidden.any(1)), np.flatnonzero(hidden.any(0))
-    x0, y0, x1, y1 = box
-    wide = (
-        min(x0, int(columns[0]) - 1), min(y0, int(rows[0]) - 1),
-        max(x1, int(columns[-1]) + 2), max(y1, int(rows[-1]) + 2),
-    )  # fmt: skip
+    (x0, y0, x1, y1), (left, top, right, bottom) = box, box_of(hidden)
+    wide = min(x0, left - 1), min(y0, top - 1), max(x1, right + 1), max(y1, bottom + 1)
     return wide, [(y0 - wide[1], wide[3] - y1), (x0 - wide[0], wide[2] - x1)]
 
 

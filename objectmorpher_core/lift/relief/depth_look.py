@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
-from threading import Lock
 from typing import Protocol
 
 import numpy as np
 
 from ... import models
 from ...base.arrays import F32, RGB, Mask, Pixels
+from ...base.masks import box_of
 from ...models.depth_net import DepthNet
 from ...pictures.image import to_u8
 from .. import LiftError
+from ..looks import Looks
 from .depth_prior import NetworkDepth
 
 Look = Callable[[Pixels, Mask], NetworkDepth | None]
@@ -25,6 +26,7 @@ GRAPHS = "depth-graph"  # family of the networks that need no PyTorch
 DEPTH_ANYTHING = "depth-anything-v2-small"
 PACKAGES = ("torch", "transformers", "safetensors")
 MARGIN = 0.35  # x the object's longer side: what of the photo around it is looked at, too
+_looks: Looks[F32] = Looks()
 
 
 def look(pixels: Pixels, mask: Mask) -> NetworkDepth | None:
@@ -39,7 +41,8 @@ def look(pixels: Pixels, mask: Mask) -> NetworkDepth | None:
     x0, y0, x1, y1 = box
     rgb = np.ascontiguousarray(to_u8(pixels[y0:y1, x0:x1]))
     try:
-        return NetworkDepth(_memory.look(there, rgb), box)
+        inverse = _looks.get(lambda: _opened(there).inverse_depth(rgb), rgb, about=there.id)
+        return NetworkDepth(inverse, box)
     except models.ModelError as error:
         raise LiftError(f"{error}; without the depth model it can be lifted") from error
 
@@ -80,13 +83,8 @@ def installed() -> There | None:
 
 def box_around(mask: Mask) -> tuple[int, int, int, int]:
     """x0, y0, x1, y1 px of what is looked at."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    longer = max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1
-    margin, (height, width) = int(np.ceil(MARGIN * longer)), mask.shape
-    return (
-        max(int(columns[0]) - margin, 0), max(int(rows[0]) - margin, 0),
-        min(int(columns[-1]) + 1 + margin, width), min(int(rows[-1]) + 1 + margin, height),
-    )  # fmt: skip
+    x0, y0, x1, y1 = box_of(mask)
+    return box_of(mask, int(np.ceil(MARGIN * max(x1 - x0, y1 - y0))))
 
 
 class Net(Protocol):
@@ -97,35 +95,10 @@ class Net(Protocol):
         ...
 
 
+@lru_cache(maxsize=1)
 def _opened(there: There) -> Net:
     if there.is_onnx:
         return DepthNet(there.at)
     from ...models.depth_net import DepthTorch
 
     return DepthTorch(there.at)
-
-
-class _Memory:
-    """The network that was opened last, and the last look: another thickness looks no second time.
-
-    What was seen is known by the digest of its pixels, so no photo is held on to.
-    """
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._net: tuple[str, Net] | None = None  # the network's id
-        self._last: tuple[str, bytes, F32] | None = None  # network's id, picture's hash
-
-    def look(self, there: There, rgb: RGB) -> F32:
-        digest = hashlib.sha256(rgb.data).digest() + bytes(str(rgb.shape), "ascii")
-        with self._lock:
-            if self._last is not None and self._last[:2] == (there.id, digest):
-                return self._last[2]
-            if self._net is None or self._net[0] != there.id:
-                self._net = there.id, _opened(there)
-            depth = self._net[1].inverse_depth(rgb)
-            self._last = there.id, digest, depth
-            return depth
-
-
-_memory = _Memory()

@@ -6,10 +6,9 @@ reads, is fetched. Without that there is no look, and the silhouette alone tells
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass
-from threading import Lock
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from ...models import registry
 from ...models.onnx_session import open_session
 from ...segment import dino_tokens
 from ..crop import Crop, planes_of
+from ..looks import Looks
 
 NO_EDGE = -12.0  # logit
 NORMAL, SIDEWAYS = slice(3, 6), 3  # of what the network says: the normals, and their x
@@ -59,6 +59,9 @@ class SeenShape:
         )  # fmt: skip
 
 
+_looks: Looks[SeenShape] = Looks()
+
+
 def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
     """Look at `mask` (H, W) of a photo.
 
@@ -66,7 +69,18 @@ def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
     """
     if missing() is not None or not mask.any():
         return None
-    return _memory.look(pixels, mask, Crop.around(mask, camera))
+    crop = Crop.around(mask, camera)
+    rgb, seen = crop.seen(pixels), crop.seen_mask(mask)
+    if not seen.any():
+        return None
+    return _looks.get(
+        lambda: _network().look(rgb, seen, crop), rgb, seen, crop.tangents, about=str(crop[:3])
+    )
+
+
+@cache
+def _network() -> ShapeModel:
+    return ShapeModel(registry.shape_network())
 
 
 def _unit(vectors: F32) -> F32:
@@ -109,33 +123,3 @@ class ShapeModel:
         raw = np.array(shape[0], np.float32)
         raw[NORMAL] = _unit(raw[NORMAL])
         return raw, float(flat[0])
-
-
-class _Memory:
-    """The network, and the last look: another thickness looks no second time.
-
-    What was seen is known by the digest of the crop, so no photo is held on to.
-    """
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._net: ShapeModel | None = None
-        self._last: tuple[bytes, SeenShape] | None = None
-
-    def look(self, pixels: Pixels, mask: Mask, crop: Crop) -> SeenShape | None:
-        rgb, seen = crop.seen(pixels), crop.seen_mask(mask)
-        if not seen.any():
-            return None
-        digest = hashlib.sha256(rgb.tobytes() + seen.tobytes() + crop.tangents.tobytes()).digest()
-        digest += bytes(str(crop[:3]), "ascii")
-        with self._lock:
-            if self._last is not None and self._last[0] == digest:
-                return self._last[1]
-            if self._net is None:
-                self._net = ShapeModel(registry.shape_network())
-            found = self._net.look(rgb, seen, crop)
-            self._last = digest, found
-            return found
-
-
-_memory = _Memory()

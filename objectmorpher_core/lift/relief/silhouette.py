@@ -14,6 +14,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask
 from ...base.kernel_files import numba
+from ...base.masks import box_of
 from ...base.poisson_disk import distance_inside
 from ...segment.matting.matte import extended_mask, frame_extension
 from .canvas import bilinear
@@ -41,14 +42,12 @@ class ReliefSilhouette:
         """Build it from `mask` (H, W), which has at least one pixel."""
         extension = frame_extension(mask)
         whole = extended_mask(mask, extension)
-        rows, columns = np.flatnonzero(whole.any(1)), np.flatnonzero(whole.any(0))
-        top, left = int(rows[0]), int(columns[0])
-        crop = whole[top : rows[-1] + 1, left : columns[-1] + 1]
+        left, top, right, bottom = box_of(whole)
+        crop = whole[top:bottom, left:right]
         extent = float(max(crop.shape))
         cell = max(1.0, extent / GRID)
         # What closes beyond the frame has an outline there.
         up, down, before, after = extension
-        bottom, right = top + crop.shape[0], left + crop.shape[1]
         is_open = (
             up > 0 and top == 0, down > 0 and bottom == whole.shape[0],
             before > 0 and left == 0, after > 0 and right == whole.shape[1],

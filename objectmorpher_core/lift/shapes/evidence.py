@@ -16,6 +16,7 @@ from scipy.optimize import minimize
 
 from ...base.arrays import F64, Mask
 from ...base.kernel_files import numba
+from ...base.masks import box_of, disc
 from ..crop import rays
 from ..relief.shape_look import SeenShape
 from .solids import Mesh, RayGrid, drawn, face_normals
@@ -120,8 +121,8 @@ class Evidence:
         error = np.maximum(seen.front_error.astype(np.float64), LEAST_ERROR) / distance
         width = float(crop.tangents[2])
         low = [float(crop.tangents[k]) + ((own.start + 0.5) / side - 0.5) * width for k in (0, 1)]
-        rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-        extent = float(max(np.ptp(rows), np.ptp(columns)) + 1)
+        x0, y0, x1, y1 = box_of(mask)
+        extent = float(max(x1 - x0, y1 - y0))
         shape = mask[own, own].shape
         grid = RayGrid((low[0], low[1]), STRIDE * width / side, (shape[0], shape[1]))
         return Evidence(
@@ -155,8 +156,7 @@ class Evidence:
         radius = int(round(THIN * float(self.outside[self.mask].max()) / STRIDE))
         if radius < 1:
             return self
-        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
-        opened = cv2.morphologyEx(self.mask.astype(np.uint8), cv2.MORPH_OPEN, disc)
+        opened = cv2.morphologyEx(self.mask.astype(np.uint8), cv2.MORPH_OPEN, disc(radius))
         rest = (self.mask & (opened == 0)).astype(np.uint8)
         _, pieces, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=4)
         is_far = np.asarray(stats)[:, cv2.CC_STAT_AREA] > LEAST_PIECE * self.mask.sum()

@@ -6,10 +6,7 @@ whose tokens they read, is fetched.
 
 from __future__ import annotations
 
-import hashlib
-from collections import OrderedDict
 from functools import cache
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -21,12 +18,13 @@ from ...models.onnx_session import open_session
 from ...segment import dino_tokens
 from ...segment.dino_tokens import PATCH
 from ..crop import SIDE
+from ..looks import Looks
 from .rods import RodView
 
 GRID = SIDE // PATCH  # tokens on a side
 UNIT = 0.5  # radians, of the network's numbers
-KEPT = 4  # looks
 SURE = 0.35  # radians, expected error, from which nothing is known
+_looks: Looks[tuple[float, float]] = Looks(kept=4)
 
 
 def planes_of(mask: Mask, rod: Mask) -> F32:
@@ -43,7 +41,10 @@ def azimuth_of(pixels: Pixels, mask: Mask, view: RodView) -> float | None:
     seen = view.crop.seen_mask(mask)
     if models.path(registry.TOKENS) is None or not view.rod.any() or not (seen & ~view.rod).any():
         return None
-    azimuth, error = _memory.look(view.crop.seen(pixels), seen, view)
+    rgb = view.crop.seen(pixels)
+    azimuth, error = _looks.get(
+        lambda: look(rgb, seen, view.rod, view.lean), rgb, seen, view.rod, about=str(view.lean)
+    )
     return azimuth if error < SURE else None
 
 
@@ -68,24 +69,3 @@ def look(rgb: RGB, mask: Mask, rod: Mask, lean: float) -> tuple[float, float]:
 @cache
 def _session() -> Any:
     return open_session(registry.rod_network())
-
-
-class _Memory:
-    """The last looks, known by the digest of what was seen: another thickness needs no other."""
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._looks: OrderedDict[bytes, tuple[float, float]] = OrderedDict()
-
-    def look(self, rgb: RGB, mask: Mask, view: RodView) -> tuple[float, float]:
-        seen = (rgb, mask, view.rod, np.array(view.lean))
-        digest = hashlib.sha256(b"".join(part.tobytes() for part in seen)).digest()
-        with self._lock:
-            if digest not in self._looks:
-                self._looks[digest] = look(rgb, mask, view.rod, view.lean)
-            while len(self._looks) > KEPT:
-                self._looks.popitem(last=False)
-            return self._looks[digest]
-
-
-_memory = _Memory()

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F64, Mask
+from ...base.masks import largest_piece
 from .evidence import HOPELESS, STRIDE, Evidence, Misfit, least
 from .lathe import FINER, PLACES, Lathe, Profile
 from .solids import AROUND, FINE, Mesh, drawn, ellipsoid, tube
@@ -281,8 +282,7 @@ def _lathes(evidence: Evidence) -> list[Lathe]:
         if any(abs(way @ other.along) > ALIKE for other in found):
             continue
         middle = _axis_of(evidence.mask, at, mean, way)
-        mirrored = _both_sides(evidence, middle, way)
-        mirrored = _largest(mirrored)
+        mirrored = largest_piece(_both_sides(evidence, middle, way))
         if mirrored.sum() < LEAST_SHARE * evidence.mask.sum():
             continue
         found.append(Lathe.of(evidence, middle, way))
@@ -315,11 +315,3 @@ def _both_sides(evidence: Evidence, middle: F64, way: F64) -> Mask:
     h, w = evidence.mask.shape
     inside = (i >= 0) & (i < h) & (j >= 0) & (j < w)
     return evidence.mask & inside & evidence.mask[i.clip(0, h - 1), j.clip(0, w - 1)]
-
-
-def _largest(mask: Mask) -> Mask:
-    """The largest piece of `mask` (h, w)."""
-    count, pieces, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
-    if count <= 2:
-        return mask
-    return np.asarray(pieces) == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))

@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F64, I64, U8, Mask, Pixels
 from ...base.camera import Camera
+from ...base.masks import disc
 from ...base.poisson_disk import nearest_in
 from ...pictures.image import to_u8
 from .. import LiftSubject
@@ -183,7 +184,7 @@ class Stack(NamedTuple):
         )  # fmt: skip
         photo, hidden = _photo(outline, subject.pixels), self.stands & self.lies
         is_wall = self.stands & (rims[1].outside(tangents) > 0)
-        clear = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * CLEAR + 1,) * 2)
+        clear = disc(CLEAR)
         wall, plain = (
             _usual(cv2.erode(own.astype(np.uint8), clear) > 0, level, photo)
             for own, level in (
@@ -241,8 +242,7 @@ def _log_depth(inverse: F64) -> F64:
 def _edged(stands: Mask, outline: ReliefSilhouette, reach: float, pixels: Pixels) -> Mask:
     """`stands` (h, w) up to the photo's own edge, within `reach` px of its outline."""
     photo = _photo(outline, pixels)
-    size = 2 * int(round(reach / outline.cell)) + 1
-    band = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    band = disc(round(reach / outline.cell))
     own = stands.astype(np.uint8)
     labels = np.zeros(stands.shape, np.int32)
     labels[cv2.erode(own, band) > 0] = 1

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from ...base.arrays import F32, F64
+from ...base.masks import box_of
 from ...document.model import Matte
 from ...models.depth_net import open_net
 from ...models.registry import ModelError
@@ -41,8 +42,8 @@ class ConditionPicture:
             solid = matte.alpha > 0.5 * matte.alpha.max(initial=0.0)
         if not solid.any():
             raise LiftError("nothing is selected that could be lifted")
-        rows, columns = np.flatnonzero(solid.any(1)), np.flatnonzero(solid.any(0))
-        low, high = np.array([columns[0], rows[0]]), np.array([columns[-1], rows[-1]])
+        box = box_of(solid)
+        low, high = np.array(box[:2]), np.array(box[2:]) - 1
         half = max(int(ROOM * (high - low).max()) // 2, 1)
         left, top = np.rint(0.5 * (low + high) - half).astype(int)
         rgba = np.dstack([matte.foreground, matte.alpha])

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, RGB, Mask
+from ...base.masks import box_of
 from ...document.model import Prompt
 from ..selection import box_around, check_mask, fill_small_holes, free_mask, keep_touched
 from .closed_form import Expected, solve_alpha
@@ -170,11 +171,8 @@ def sharpen_band(rgb: RGB, mask: Mask, near: Mask | None = None, band: int = BAN
     unknown = ~(inner | outer)
     if not unknown.any():
         return mask
-    rows, columns = np.flatnonzero(unknown.any(1)), np.flatnonzero(unknown.any(0))
-    crop = np.s_[
-        max(rows[0] - 2, 0) : rows[-1] + 3,
-        max(columns[0] - 2, 0) : columns[-1] + 3,
-    ]
+    x0, y0, x1, y1 = box_of(unknown, 2)
+    crop = np.s_[y0:y1, x0:x1]
     picture = np.asarray(rgb[around][crop], np.float32) / np.float32(255)
     start = own[crop].astype(np.float32)
     expected = Expected(start, np.full(start.shape, PRIOR, np.float32))

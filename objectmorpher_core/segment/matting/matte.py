@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, F64, U8, Mask, Pixels, Selection, unit_pixels
+from ...base.masks import box_of
 from ...document.model import Matte
 from ..mask_edit import FULL, grow, is_selected, is_soft
 from .soft_edge import find_alpha
@@ -40,9 +41,9 @@ def frame_extension(mask: Mask) -> tuple[int, int, int, int]:
     a tenth of its size; those pixels are invented, and counted so.
     """
     height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    reach = round(EXTENSION * max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1)
-    touches = (rows[0] == 0, rows[-1] == height - 1, columns[0] == 0, columns[-1] == width - 1)
+    x0, y0, x1, y1 = box_of(mask)
+    reach = round(EXTENSION * (max(x1 - x0, y1 - y0) - 1) + 1)
+    touches = (y0 == 0, y1 == height, x0 == 0, x1 == width)
     limits = (height - 1, height - 1, width - 1, width - 1)
     top, bottom, left, right = (
         int(min(reach, limit)) if touch else 0 for touch, limit in zip(touches, limits, strict=True)
@@ -178,15 +179,12 @@ def build_matte(
     band = band_width(mask.shape[1], mask.shape[0])
     extension = frame_extension(is_selected(mask))
     mask = extended_mask(mask, extension)
-    height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    left, top = max(columns[0] - margin, 0), max(rows[0] - margin, 0)
-    right, bottom = min(columns[-1] + 1 + margin, width), min(rows[-1] + 1 + margin, height)
-    window = (slice(top, bottom), slice(left, right))
+    left, top, right, bottom = box_of(mask, margin)
+    window = np.s_[top:bottom, left:right]
     part = extended_part(pixels, extension, window)
     own = None if mixed is None else extended_mask(mixed, extension)[window]
     alpha, colours = soft_cutout(part, mask[window], band, own)
-    return Matte(int(left) - extension[2], int(top) - extension[0], alpha, colours.foreground)
+    return Matte(left - extension[2], top - extension[0], alpha, colours.foreground)
 
 
 def soft_cutout(

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, U8, Mask, Pixels, Selection, crop, unit_pixels
+from ...base.masks import disc
 from ...document.model import Matte
 from ..mask_edit import FULL, as_coverage, is_selected
 from ..selection import box_around
@@ -85,7 +86,7 @@ def background_in_edge(pixels: Pixels, matte: Matte) -> F32:
     height, width = pixels.shape[:2]
     band = band_width(width, height)
     spill = np.zeros(matte.foreground.shape, np.float32)
-    near_edge = cv2.dilate((matte.alpha < 1).view(np.uint8), _disc(RIM[1] * band))
+    near_edge = cv2.dilate((matte.alpha < 1).view(np.uint8), disc(int(np.ceil(RIM[1] * band))))
     window = box_around((near_edge > 0) & (matte.alpha > 0), int(SPREADS[1] * band) + 2)
     if window is None:
         return spill
@@ -149,8 +150,3 @@ def _blurred(image: F32, sigma: float) -> F32:
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if times > 1 else image
     soft = cv2.GaussianBlur(small, (0, 0), sigma / times, borderType=cv2.BORDER_REPLICATE)
     return np.asarray(cv2.resize(soft, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
-
-
-def _disc(radius: float) -> np.ndarray:
-    size = 2 * int(np.ceil(radius)) + 1
-    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))

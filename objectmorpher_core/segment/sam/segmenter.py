@@ -12,6 +12,7 @@ import numpy as np
 
 from ... import models
 from ...base.arrays import F32, RGB, Mask
+from ...base.masks import box_of
 from ...base.progress import Progress, part, silent
 from ...document.model import Click, Prompt
 from ...models import HubModel, ModelError, device
@@ -184,9 +185,9 @@ class Sam:
     ) -> tuple[Mask, float]:
         """(H, W) the answer, refined where the thing is small, and how sure it is."""
         mask = view.mask(rgb, answer)
-        box = _box_of(mask)
+        box = box_of(mask)
         longer = max(rgb.shape[:2])
-        if box is None or longer <= view.frame.side or _side(box) > SMALL * longer:
+        if box[0] == box[2] or longer <= view.frame.side or _side(box) > SMALL * longer:
             return mask, answer.score
         look = next((k for k in self._looks if _holds(k.frame.box, box)), None)
         if look is None:
@@ -242,14 +243,6 @@ def best() -> Sam | None:
         ):
             return found
     return None
-
-
-def _box_of(mask: Mask) -> Box | None:
-    """left, top, right, bottom px of what is in a mask (H, W)."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    if not len(rows):
-        return None
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
 def _side(box: Box) -> int:

@@ -181,8 +181,6 @@ def _text_rows(stream: IO[bytes], element: Element) -> Iterator[Table]:
         yield {name: table[:, k] for k, name in enumerate(element.names)}
 
 
-__all__ = ["SplatFileError", "decode_ply", "encode_ply", "read_ply"]
-
 SH0 = 0.28209479177387814  # the constant spherical harmonic, 1 / (2 sqrt(pi))
 LEAST_ALPHA = 1e-6  # a logit is infinite at 0 and 1
 FLATNESS = 0.01  # x the smaller of a surfel's two scales

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import secrets
 import threading
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from objectmorpher_core.base.arrays import RGB
@@ -50,7 +50,7 @@ class StudyPictures:
             if subject.guidance.picture is not None
         }
         self._names: dict[str, _Shown] = {}
-        self._bytes: OrderedDict[_Shown, bytes] = OrderedDict()
+        self._encoded = lru_cache(KEPT)(_encoded)
         self._lock = threading.Lock()
 
     def size(self, subject: str) -> tuple[int, int]:
@@ -82,17 +82,7 @@ class StudyPictures:
         """PNG without any metadata but the colours' profile; None for an unknown name."""
         with self._lock:
             shown = self._names.get(name)
-            if shown is None:
-                return None
-            if shown in self._bytes:
-                self._bytes.move_to_end(shown)
-                return self._bytes[shown]
-        data = _encoded(shown)
-        with self._lock:
-            self._bytes[shown] = data
-            while len(self._bytes) > KEPT:
-                self._bytes.popitem(last=False)
-        return data
+        return None if shown is None else self._encoded(shown)
 
     def _name(self, shown: _Shown) -> str:
         with self._lock:

@@ -131,9 +131,9 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     document = replace(document, photo=replace(document.photo, picture=picture))
     document = edits.set_plate(document, make_plate(dark, plate_cover(document), "telea"))
     place = Placement(move=(30.0, -8.0), scale=0.8, turn=(35.0, 0.0, 0.0))
-    document = edits.set_relight(edits.set_placement(document, 0, place), 0, 1.0)
+    document = edits.set_share(edits.set_placement(document, 0, place), 0, "relight", 1.0)
     document = edits.set_shadow(document, 0, Shadow(strength=0.7, length=1.2))
-    document = edits.set_feather(edits.set_harmony(document, 0, 1.0), 1.5)
+    document = edits.set_feather(edits.set_share(document, 0, "harmony", 1.0), 1.5)
     document = edits.set_finish(document, 0, Finish(0.7, -0.3, 0.2, 0.5))
     cache, view = Cache(), _view()
     cache.frame_time = np.inf
@@ -152,7 +152,7 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     plain = composite(edits.set_shadow(document, 0, Shadow())).pixels.astype(np.float32) / 255
     assert np.abs(plain - exported).max() > 0.1  # there is a shadow
     assert max(look.gain) < 1  # and another light
-    turned = composite(edits.set_relight(document, 0, 0.0)).pixels.astype(np.float32) / 255
+    turned = composite(edits.set_share(document, 0, "relight", 0.0)).pixels.astype(np.float32) / 255
     assert np.abs(turned - exported).max() > 3 * PIXEL  # that stays while it turns
     assert np.abs(window - exported).mean() <= PIXEL
 
@@ -199,7 +199,7 @@ def test_the_window_shows_grain_as_it_is_exported(renderer, kind, zoom):
     scene = shapes.lifted_scene(np.rint(grey).clip(0, 255).astype(np.uint8), inside, 800)
     place = Placement(move=(30.5, -8.0), scale=1.4)
     plain = edits.set_placement(scene.document(), 0, place)
-    document = edits.set_grain(plain, 0, 1.0)
+    document = edits.set_share(plain, 0, "grain", 1.0)
     cache, view = Cache(), _view()
     cache.frame_time = np.inf
     view.set_zoom(zoom, (80, 60), SIZE)
@@ -249,7 +249,7 @@ def test_the_window_shows_focus_as_it_is_exported(renderer, kind, zoom):
     parts = int(1 / zoom)
     x, y = int(view.left), int(view.top)
     seen = np.s_[y : y + parts * window.shape[0], x : x + parts * window.shape[1]]
-    sharp = edits.set_defocus(document, 0, 0.0)
+    sharp = edits.set_share(document, 0, "defocus", 0.0)
 
     def small(picture):
         rows = picture[seen].reshape(window.shape[0], parts, window.shape[1], parts, 3)

@@ -51,7 +51,7 @@ def test_what_keeps_its_depth_or_comes_into_focus_is_not_touched():
 
 def test_of_what_the_frame_cuts_off_only_the_photo_is_asked():
     made = shapes.scene("frame")
-    document = edits.set_defocus(made.document(), 0, 1.0)
+    document = edits.set_share(made.document(), 0, "defocus", 1.0)
     far = edits.set_placement(document, 0, Placement(depth=2.0))
     assert made.matte.left < 0 or made.matte.top < 0 or made.matte.box[2] > shapes.WIDTH
     assert focussed.look(far).blur == 0
@@ -85,10 +85,10 @@ def test_a_harmonised_object_is_put_out_of_focus_and_can_be_left():
     document = focussed.farther(focussed.scene(5.0), 1.8)
     assert document.objects[0].defocus > 0
     soft = composite(document)
-    sharp = composite(edits.set_defocus(document, 0, 0.0))
+    sharp = composite(edits.set_share(document, 0, "defocus", 0.0))
     changed = (soft.pixels != sharp.pixels).any(2)
     fine = [cv2.Laplacian(c.pixels.astype(np.float32), -1)[changed].std() for c in (soft, sharp)]
     assert fine[0] < 0.5 * fine[1]
     assert (soft.footprint >= changed).all()
     with pytest.raises(edits.EditError):
-        edits.set_defocus(document, 0, 1.2)
+        edits.set_share(document, 0, "defocus", 1.2)

@@ -85,7 +85,7 @@ def test_a_moved_object_is_as_noisy_as_the_photo(place, blur):
     true = 255 * DEVIATION * (0.5 + level) * _noise((56, 56), blur, 7)
     wanted, variance = _power(true)
     without, _ = _power(composite(moved, {0: puppet}).pixels[SEEN])
-    grained = composite(edits.set_grain(moved, 0, 1.0), {0: puppet}).pixels[SEEN]
+    grained = composite(edits.set_share(moved, 0, "grain", 1.0), {0: puppet}).pixels[SEEN]
     power, after = _power(grained)
 
     def off(found: np.ndarray) -> float:
@@ -101,12 +101,12 @@ def test_a_moved_object_is_as_noisy_as_the_photo(place, blur):
 
 def test_at_rest_and_beside_it_every_byte_is_the_photos():
     document, puppet = _scene(0.0)
-    still = edits.set_grain(document, 0, 1.0)
+    still = edits.set_share(document, 0, "grain", 1.0)
     assert composite(still, {0: puppet}).pixels is document.photo.pixels
     moved = edits.set_placement(still, 0, PLACES["enlarged"])
     result = composite(moved, {0: puppet})
     assert result.outside_footprint_changed == 0
-    plain = composite(edits.set_grain(moved, 0, 0.0), {0: puppet})
+    plain = composite(edits.set_share(moved, 0, "grain", 0.0), {0: puppet})
     assert np.array_equal(result.footprint, plain.footprint)
     again = composite(moved, {0: puppet})
     assert np.array_equal(result.pixels, again.pixels)  # no chance in it
@@ -231,10 +231,10 @@ def test_bytes_are_given_the_same_grain_and_alpha_stays():
 
 def test_it_is_kept_and_nonsense_is_refused():
     document, _ = _scene(0.0)
-    kept = decode_session(encode_session(edits.set_grain(document, 0, 0.6)))
+    kept = decode_session(encode_session(edits.set_share(document, 0, "grain", 0.6)))
     assert kept.objects[0].grain == 0.6
     with pytest.raises(edits.EditError, match=r"grain of 1\.5"):
-        edits.set_grain(document, 0, 1.5)
+        edits.set_share(document, 0, "grain", 1.5)
     wrong = replace(document, objects=(replace(document.objects[0], grain=-1.0),))
     with pytest.raises(SessionError, match="grain is -1"):
         decode_session(encode_session(wrong))

@@ -45,7 +45,7 @@ def test_an_object_in_the_dark_is_darker():
     document = replace(document, photo=replace(document.photo, picture=picture))
     document = edits.set_placement(document, 0, Placement(move=(55.0, 0.0), scale=0.5))
     plain = composite(document, {0: scene.puppet}).pixels.astype(int)
-    lit = composite(edits.set_harmony(document, 0, 1.0), {0: scene.puppet}).pixels
+    lit = composite(edits.set_share(document, 0, "harmony", 1.0), {0: scene.puppet}).pixels
     assert (plain - lit).max() > 15
     assert (plain - lit).min() >= -1
 

@@ -94,7 +94,8 @@ def test_a_turned_ball_looks_as_it_did(lamp):
     truth = scene.pixels.astype(float)
 
     def error(relight: float) -> float:
-        pixels = composite(edits.set_relight(document, 0, relight), {0: scene.puppet}).pixels
+        relit = edits.set_share(document, 0, "relight", relight)
+        pixels = composite(relit, {0: scene.puppet}).pixels
         x, y = np.meshgrid(np.arange(shapes.WIDTH) + 0.5, np.arange(shapes.HEIGHT) + 0.5)
         inner = np.hypot(x - MIDDLE[0], y - MIDDLE[1]) < 0.8 * RADIUS
         return float(np.abs(pixels.astype(float) - truth)[inner].mean())
@@ -109,13 +110,13 @@ def test_what_only_moved_keeps_its_light():
     for place in (Placement(move=(11.0, -4.0)), Placement(depth=0.5), Placement(scale=1.3)):
         document = edits.set_placement(scene.document(), 0, place)
         plain = composite(document, {0: scene.puppet}).pixels
-        relit = composite(edits.set_relight(document, 0, 1.0), {0: scene.puppet}).pixels
+        relit = composite(edits.set_share(document, 0, "relight", 1.0), {0: scene.puppet}).pixels
         assert np.abs(plain.astype(int) - relit).max() <= 1
 
 
 def test_what_did_not_move_is_the_photo():
     scene = _ball(LAMPS[0], _patched())
-    document = edits.set_relight(scene.document(), 0, 1.0)
+    document = edits.set_share(scene.document(), 0, "relight", 1.0)
     assert np.array_equal(composite(document, {0: scene.puppet}).pixels, scene.pixels)
     turned = composite(edits.set_placement(document, 0, TURNED), {0: scene.puppet})
     assert turned.outside_footprint_changed == 0
@@ -124,7 +125,7 @@ def test_what_did_not_move_is_the_photo():
 
 def test_how_many_rows_are_blended_at_a_time_changes_nothing():
     scene = _ball(LAMPS[0], _patched())
-    document = edits.set_relight(edits.set_placement(scene.document(), 0, TURNED), 0, 1.0)
+    document = edits.set_share(edits.set_placement(scene.document(), 0, TURNED), 0, "relight", 1.0)
     few, all_at_once = (
         composite(document, {0: scene.puppet}, rows=rows).pixels for rows in (1, 10_000)
     )
@@ -185,10 +186,10 @@ def test_the_same_light_on_numbers_and_on_bytes():
 
 
 def test_a_session_keeps_it_and_nonsense_is_refused():
-    document = edits.set_relight(_ball(LAMPS[0], _plain()).document(), 0, 0.75)
+    document = edits.set_share(_ball(LAMPS[0], _plain()).document(), 0, "relight", 0.75)
     assert decode_session(encode_session(document)).objects[0].relight == 0.75
     with pytest.raises(edits.EditError, match=r"relighting of -0\.1"):
-        edits.set_relight(document, 0, -0.1)
+        edits.set_share(document, 0, "relight", -0.1)
     wrong = replace(document, objects=(replace(document.objects[0], relight=2.0),))
     with pytest.raises(SessionError, match="relighting is 2"):
         decode_session(encode_session(wrong))

@@ -159,7 +159,7 @@ def test_a_sketch_of_a_shadow_is_near_the_exact_one():
 def test_outside_the_footprint_nothing_changes_with_shadow_and_light(name):
     scene = shapes.scene(name)
     document = edits.set_shadow(_moved(name), 0, replace(DARK, length=1.5, direction=150))
-    result = composite(edits.set_harmony(document, 0, 1.0), {0: scene.puppet})
+    result = composite(edits.set_share(document, 0, "harmony", 1.0), {0: scene.puppet})
     plain = composite(_moved(name), {0: scene.puppet})
     different = (result.pixels != scene.pixels).any(-1)
     assert not (different & ~result.footprint).any()
@@ -185,7 +185,7 @@ def test_a_shadow_only_darkens_and_never_the_object():
 
 
 def test_how_many_rows_are_blended_at_a_time_changes_nothing():
-    document = edits.set_harmony(edits.set_shadow(_moved(), 0, DARK), 0, 1.0)
+    document = edits.set_share(edits.set_shadow(_moved(), 0, DARK), 0, "harmony", 1.0)
     scene = shapes.scene("ellipse")
     pictures = [composite(document, {0: scene.puppet}, rows=rows).pixels for rows in (1, 10_000)]
     assert np.array_equal(pictures[0], pictures[1])
@@ -193,7 +193,7 @@ def test_how_many_rows_are_blended_at_a_time_changes_nothing():
 
 def test_what_has_not_moved_has_no_shadow_and_its_own_light():
     scene = shapes.scene("ellipse")
-    document = edits.set_harmony(edits.set_shadow(scene.document(), 0, DARK), 0, 1.0)
+    document = edits.set_share(edits.set_shadow(scene.document(), 0, DARK), 0, "harmony", 1.0)
     assert np.array_equal(composite(document).pixels, scene.pixels)
     hidden = edits.set_visible(document, 0, False)
     assert np.array_equal(
@@ -242,14 +242,14 @@ def test_nonsense_is_refused():
         with pytest.raises(edits.EditError, match=r"shadow|ground"):
             edits.set_shadow(document, 0, shadow)
     with pytest.raises(edits.EditError, match="harmony of 2"):
-        edits.set_harmony(document, 0, 2.0)
+        edits.set_share(document, 0, "harmony", 2.0)
     with pytest.raises(edits.EditError, match=r"is not 0\.25"):
         edits.set_feather(document, 0.0)
 
 
 def test_a_session_keeps_shadow_light_and_edge():
     document = edits.set_shadow(_moved(), 0, replace(DARK, direction=-40, ground=33.0))
-    document = edits.set_feather(edits.set_harmony(document, 0, 0.5), 2.0)
+    document = edits.set_feather(edits.set_share(document, 0, "harmony", 0.5), 2.0)
     loaded = decode_session(encode_session(document))
     assert loaded.objects[0].shadow == document.objects[0].shadow
     assert loaded.objects[0].harmony == 0.5 and loaded.feather == 2.0

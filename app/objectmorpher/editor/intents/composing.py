@@ -13,7 +13,7 @@ from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
-from objectmorpher_core.document.settings import Finish, Hint, Shadow
+from objectmorpher_core.document.settings import Finish, Hint, Shadow, Share
 
 from ...canvas.layer import CanvasLayer
 from ...canvas.memo import same
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 VARIANTS, REPAIR, DEPTH = "variants", "repair", "depth"
 COUNT = 3  # variants
 USUAL_SHADOW = 0.55
-GRAIN = 2  # canvas px per px of the picture of a stroke
+GRAIN = 2  # canvas px per px of a tint
 FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
 
 
@@ -292,17 +292,9 @@ class Composing:
         """Previews another shadow of the current object; `Editor.commit` makes it a step."""
         self._preview(lambda document, k: edits.set_shadow(document, k, shadow))
 
-    def preview_harmony(self, harmony: float) -> None:
-        self._preview(lambda document, k: edits.set_harmony(document, k, harmony))
-
-    def preview_relight(self, relight: float) -> None:
-        self._preview(lambda document, k: edits.set_relight(document, k, relight))
-
-    def preview_grain(self, grain: float) -> None:
-        self._preview(lambda document, k: edits.set_grain(document, k, grain))
-
-    def preview_defocus(self, defocus: float) -> None:
-        self._preview(lambda document, k: edits.set_defocus(document, k, defocus))
+    def preview_share(self, name: Share, share: float) -> None:
+        """Previews how far the current object fits into its new place."""
+        self._preview(lambda document, k: edits.set_share(document, k, name, share))
 
     def preview_finish(self, finish: Finish) -> None:
         """Previews another opacity and other colours of the current object."""
@@ -405,18 +397,25 @@ def stroke_tint(
     view: ViewState, strokes: Sequence[Stroke], colour: tuple[int, int, int]
 ) -> CanvasLayer:
     """What strokes cover, as a tint of the levels `colour` over the canvas."""
+    covered = np.maximum.reduce([on_canvas(view, stroke.coverage) for stroke in strokes])
+    return tint(covered[..., None] * np.array(colour, np.float32), covered * 255)
+
+
+def on_canvas(view: ViewState, field: F32, scale: float = 1.0) -> F32:
+    """(h, w) a field as the canvas shows it, of px that are `scale` to one of the photo."""
     size = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
-    step = GRAIN / view.zoom  # photo px per px of the tint
-    start = (view.left + step / 2 - 0.5, view.top + step / 2 - 0.5)
+    step = GRAIN / view.zoom * scale  # px of the field per px of the tint
+    start = [edge * scale + step / 2 - 0.5 for edge in (view.left, view.top)]
     matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    covered = np.zeros(size[::-1], np.float32)
-    for stroke in strokes:
-        shown = cv2.warpAffine(stroke.coverage, matrix, size, flags=flags)
-        np.maximum(covered, shown, out=covered)
-    ink = np.array(colour, np.float32)
-    rgba = np.dstack([covered[..., None] * ink, covered * 255]).astype(np.uint8)
-    box = (0.0, 0.0, float(size[0] * GRAIN), float(size[1] * GRAIN))
+    return np.asarray(cv2.warpAffine(field, matrix, size, flags=flags), np.float32)
+
+
+def tint(ink: np.ndarray, alpha: np.ndarray) -> CanvasLayer:
+    """Levels (h, w, 3), premultiplied, and alpha (h, w) of 255 over the canvas."""
+    height, width = alpha.shape[:2]
+    rgba = np.dstack([ink, alpha]).astype(np.uint8)
+    box = (0.0, 0.0, float(width * GRAIN), float(height * GRAIN))
     return CanvasLayer(box, rgba, is_coarse=True, is_tint=True)
 
 

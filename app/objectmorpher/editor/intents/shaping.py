@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
@@ -31,6 +30,7 @@ from ...canvas.layer import CanvasLayer
 from ...system.texts import t
 from ...worker import job_functions
 from ..view import Painted
+from .composing import on_canvas, tint
 
 if TYPE_CHECKING:
     from objectmorpher_core.lift.registration.imported import Import, ImportTarget
@@ -45,7 +45,6 @@ IMPORT = "import"  # kind of job
 DETAIL = 512  # px, longer side of the map of what is nearer
 STEP = 0.06  # x the object's size, that one stroke brings nearer
 DEEPEST = 0.6  # x the object's size: no stroke goes on beyond
-GRAIN = 2  # canvas px per px of the tint
 NEARER, FARTHER, HIDDEN = (0xFF, 0xB0, 0x00), (0x5A, 0xA9, 0xFF), (0xB4, 0x8C, 0xFF)
 FULL_TINT = 0.2  # of nearness, that is shown at full strength
 TINT = 170  # of 255, its strength
@@ -223,20 +222,12 @@ class Shaping:
             field, scale = self._hidden(size).astype(np.float32) * FULL_TINT, 1.0
         if not field.any():
             return None
-        view = editor.view
-        shape = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
-        step = GRAIN / view.zoom * scale
-        start = [edge * scale + step / 2 - 0.5 for edge in (view.left, view.top)]
-        matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        seen = cv2.warpAffine(field, matrix, shape, flags=flags)
+        seen = on_canvas(editor.view, field, scale)
         alpha = np.clip(np.abs(seen) / FULL_TINT, 0, 1)[..., None]
         up = HIDDEN if painted is Painted.HIDDEN else NEARER
         ink = np.where(seen[..., None] > 0, np.array(up, np.float32), np.array(FARTHER, np.float32))
         strength = alpha * (TINT / 255)
-        rgba = np.dstack([ink * strength, 255 * strength]).astype(np.uint8)
-        box = (0.0, 0.0, float(shape[0] * GRAIN), float(shape[1] * GRAIN))
-        return CanvasLayer(box, rgba, is_coarse=True, is_tint=True)
+        return tint(ink * strength, 255 * strength)
 
     # Other photos of the object
 

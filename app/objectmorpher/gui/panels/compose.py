@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
@@ -20,10 +19,7 @@ from objectmorpher_core.document.settings import (
     LEAST_FEATHER,
     MOST_FEATHER,
     MOST_SHADOW,
-    USUAL_DEFOCUS,
-    USUAL_GRAIN,
-    USUAL_HARMONY,
-    USUAL_RELIGHT,
+    USUAL_SHARES,
 )
 
 from ...commands import run
@@ -52,6 +48,7 @@ from ..widgets.widgets import (
     number_field,
     pictures,
     rule,
+    take,
     tooltip,
 )
 from ..window.landmarks import mark
@@ -180,7 +177,7 @@ def _draw_shadow(editor: Editor) -> None:
     number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, low=0.0, high=100.0)
     change = number_field(number, 100 * shadow.strength)
     changed = replace(shadow, strength=change.value / 100)
-    _take(editor, change, lambda: preview(changed), t("Shadow's strength"))
+    take(editor, change, lambda: preview(changed), t("Shadow's strength"))
     if shadow.strength == 0 and not change.is_changed:
         note(t("Strength adds a shadow on the ground."))
         return
@@ -192,14 +189,14 @@ def _draw_shadow(editor: Editor) -> None:
     for number, name, unit in shares:
         change = number_field(number, unit * getattr(shadow, name))
         changed = replace(shadow, **{name: change.value / unit})
-        _take(editor, change, lambda changed=changed: preview(changed), t("Shape of shadow"))
+        take(editor, change, lambda changed=changed: preview(changed), t("Shape of shadow"))
     usual, ground = editor.composing.ground(replace(shadow, ground=None)), shadow.ground
     number = Number(t("Ground"), "%.0f°", 0.5, 5.0, usual, 0.0, 90.0)
     change = number_field(number, usual if ground is None else ground)
     tooltip(t("How steeply you look down on the ground: 0° along it, 90° from above"))
     ground = None if change.value == usual else change.value
     changed = replace(shadow, ground=ground)
-    _take(editor, change, lambda: preview(changed), t("Ground of shadow"))
+    take(editor, change, lambda: preview(changed), t("Ground of shadow"))
     _draw_direction(editor)
     is_on = bool(editor.document and editor.document.depth is not None)
     if editor.models.has_depth or is_on:
@@ -229,7 +226,7 @@ def _draw_direction(editor: Editor) -> None:
     imgui.set_cursor_pos_y(top)
     change = dial("direction", shadow.direction, t("Where the shadow falls; Shift: steps of 15°"))
     changed = replace(shadow, direction=change.value)
-    _take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
+    take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
     imgui.same_line(0, theme.pt(12))
     imgui.set_cursor_pos_y(top + drop)
     imgui.align_text_to_frame_padding()
@@ -240,7 +237,7 @@ def _draw_direction(editor: Editor) -> None:
     if is_changed or is_done:
         change = FieldChange(wrapped(turned), is_changed, is_done)
         changed = replace(shadow, direction=change.value)
-        _take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
+        take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
     imgui.set_cursor_pos_y(top + theme.pt(SIDE + 4))
     imgui.dummy(ImVec2(0, 0))
 
@@ -256,16 +253,12 @@ def _draw_light(editor: Editor) -> None:
     if editor.composing.refiner == "none":
         note(t("Harmonise gives the object the light of its new place and of how it is turned."))
         return
-    item, composing = editor.object, editor.composing
-    rows = (
-        (t("Place"), 100 * USUAL_HARMONY, item.harmony, composing.preview_harmony),
-        (t("Turning"), 100 * USUAL_RELIGHT, item.relight, composing.preview_relight),
-        (t("Grain"), 100 * USUAL_GRAIN, item.grain, composing.preview_grain),
-        (t("Focus"), 100 * USUAL_DEFOCUS, item.defocus, composing.preview_defocus),
-    )
-    for name, usual, share, preview in rows:
-        change = number_field(Number(name, "%.0f %%", 0.5, 5.0, usual, 0.0, 100.0), 100 * share)
-        _take(editor, change, lambda p=preview, c=change: p(c.value / 100), t("Adjust light"))
+    item, preview = editor.object, editor.composing.preview_share
+    labels = t("Place"), t("Turning"), t("Grain"), t("Focus")
+    for label, (name, usual) in zip(labels, USUAL_SHARES.items(), strict=True):
+        number = Number(label, "%.0f %%", 0.5, 5.0, 100 * usual, 0.0, 100.0)
+        change = number_field(number, 100 * getattr(item, name))
+        take(editor, change, lambda n=name, c=change: preview(n, c.value / 100), t("Adjust light"))
     note(t("Light around its new place; light that stays where it was while it turns."))
     note(t("Grain: the photo's own, where moving the object has smoothed it."))
     note(t("Focus: nearer or farther, as blurred as the photo is there."))
@@ -289,7 +282,7 @@ def _draw_finish(editor: Editor) -> None:
     for number, name, unit in rows:
         change = number_field(number, unit * getattr(finish, name))
         changed = replace(finish, **{name: change.value / unit})
-        _take(editor, change, lambda changed=changed: preview(changed), t("Look of object"))
+        take(editor, change, lambda changed=changed: preview(changed), t("Look of object"))
     choices = [Segment(mode, t(label)) for mode, label in MIXED.items()]
     mode = segmented("blend mode", choices, finish.blend_mode)
     if mode != finish.blend_mode:
@@ -329,18 +322,10 @@ def _draw_edge(editor: Editor) -> None:
     number = Number(t("Blend"), "%.2f ×", 0.005, 0.25, 1.0, LEAST_FEATHER, MOST_FEATHER)
     change = number_field(number, editor.document.feather)
     preview = editor.composing.preview_feather
-    _take(editor, change, lambda: preview(change.value), t("Blend of edge"))
+    take(editor, change, lambda: preview(change.value), t("Blend of edge"))
     note(t("How wide the edit fades into the photo."))
     draw_decontaminate(editor)
     command_button(editor, "edge_brush", width=-1)
-
-
-def _take(editor: Editor, change: FieldChange, preview: Callable[[], None], label: str) -> None:
-    """Shows a change, and makes it a step when it is complete."""
-    if change.is_changed:
-        preview()
-    if change.is_done:
-        editor.commit(label)
 
 
 # The Compose tool's network, which makes the edit look as if it had been photographed.
@@ -363,9 +348,7 @@ def draw_network(editor: Editor) -> None:
     command_button(editor, "refine_again", width=half)
     number = Number(t("Amount"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100.0)
     change = number_field(number, 100 * editor.refining.refined.strength)
-    if change.is_changed:
-        editor.refining.preview_strength(change.value / 100)
-    if change.is_done:
-        editor.commit(t("Amount of refinement"))
+    preview = editor.refining.preview_strength
+    take(editor, change, lambda: preview(change.value / 100), t("Amount of refinement"))
     command_button(editor, "unrefine", width=-1)
     note(t("It is removed as soon as you change the edit."))

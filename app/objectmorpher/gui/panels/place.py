@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 from imgui_bundle import imgui
 
@@ -23,6 +24,7 @@ from ..widgets.widgets import (
     note,
     number_field,
     small_text,
+    take,
     tooltip,
 )
 from ..window.landmarks import mark
@@ -76,10 +78,7 @@ def draw_place(editor: Editor) -> None:
             shown = replace(number, name=t(number.name), format=t(number.format))
             change = number_field(shown, values[number.name])
             values[number.name] = change.value
-            if change.is_changed:
-                _change(editor, group, values)
-            if change.is_done:
-                editor.commit(t(DONE[number.name]))
+            take(editor, change, partial(_change, editor, group, values), t(DONE[number.name]))
         if group.title == "Position":
             _draw_depth(editor, placement)
         if group.title == "Turn":
@@ -151,10 +150,8 @@ def _draw_seen_from(editor: Editor) -> None:
     number = Number(t("From above"), "%.0f°", 0.25, 1.0, usual, 0.0, 90.0)
     change = number_field(number, editor.placing.seen_from)
     tooltip(t("How steeply you look down on it: 0° from its side, 90° from above"))
-    if change.is_changed:
-        editor.placing.look_down(None if change.value == usual else change.value)
-    if change.is_done:
-        editor.commit(t("Set what is upright"))
+    wanted = None if change.value == usual else change.value
+    take(editor, change, lambda: editor.placing.look_down(wanted), t("Set what is upright"))
 
 
 def _change(editor: Editor, group: Group, values: dict[str, float]) -> None:

@@ -26,6 +26,7 @@ from ..widgets.widgets import (
     heading,
     note,
     number_field,
+    take,
     tooltip,
 )
 
@@ -95,10 +96,8 @@ def draw_decontaminate(editor: Editor) -> None:
     number = Number(t("Clean"), "%.0f %%", 0.5, 10.0, 0.0, 0.0, 100.0)
     change = number_field(number, 100 * editor.edging.decontaminate)
     tooltip(t("Decontaminate: take the background's colour out of the object's soft edge"))
-    if change.is_changed:
-        editor.edging.preview_decontaminate(change.value / 100)
-    if change.is_done:
-        editor.commit(t("Decontaminate edge"))
+    preview = editor.edging.preview_decontaminate
+    take(editor, change, lambda: preview(change.value / 100), t("Decontaminate edge"))
 
 
 def draw_refinement_note(editor: Editor) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -257,6 +257,14 @@ class FieldChange:
     value: float
     is_changed: bool = False
     is_done: bool = False  # the change is complete: one step for undo
+
+
+def take(editor: Editor, change: FieldChange, preview: Callable[[], None], label: str) -> None:
+    """Shows a change, and makes it a step when it is complete."""
+    if change.is_changed:
+        preview()
+    if change.is_done:
+        editor.commit(label)
 
 
 def number_field(number: Number, value: float) -> FieldChange:

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64, RGB
+from objectmorpher_core.base.masks import box_of
 
 from ..measures.dino import Dino
 from ..measures.fidelity import psnr, ssim
@@ -59,7 +60,5 @@ def _cut(case: TruthCase) -> RGB:
 
 def _window(region: F64) -> tuple[slice, slice]:
     """The box of a region and a little more."""
-    rows, columns = np.flatnonzero(region.any(1)), np.flatnonzero(region.any(0))
-    first = max(int(rows[0]) - CONTEXT, 0), max(int(columns[0]) - CONTEXT, 0)
-    last = int(rows[-1]) + 1 + CONTEXT, int(columns[-1]) + 1 + CONTEXT
-    return slice(first[0], last[0]), slice(first[1], last[1])
+    x0, y0, x1, y1 = box_of(region, CONTEXT)
+    return slice(y0, y1), slice(x0, x1)

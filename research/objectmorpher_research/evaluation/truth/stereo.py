@@ -14,6 +14,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64, RGB, Mask
 from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.masks import largest_piece
 
 from ..error import EvaluationError
 from .cases import RIGID_POINTS, TruthCase, TruthGuidance, inner_pixels, spread_out
@@ -87,10 +88,7 @@ def _motorcycle(disparity: F64) -> Mask:
     floor = (y > GROUND[0]) & (x < GROUND[1]) & (disparity > 0)
     slope, start = np.polyfit(y[floor], disparity[floor], 1)
     found = disparity > np.maximum(slope * y + start + ABOVE_GROUND, NEAREST_WALL)
-    _, labels = cv2.connectedComponents(found.astype(np.uint8))
-    areas: F64 = np.bincount(labels.ravel()).astype(np.float64)
-    largest = 1 + int(areas[1:].argmax())
-    return _closed(labels == largest)
+    return _closed(largest_piece(found))
 
 
 def _seen_from_right(mask: Mask, disparity: F64) -> Mask:

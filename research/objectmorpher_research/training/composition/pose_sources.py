@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, frozen
+from objectmorpher_core.base.masks import box_of
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import LiftedObject
 from objectmorpher_core.lift import LiftError, LiftSubject
@@ -184,8 +185,7 @@ def carried(two: Two) -> F64:
 
 def _middle(subject: LiftSubject) -> F64:
     """(2,) px of the box around the mask."""
-    rows, columns = np.flatnonzero(subject.mask.any(1)), np.flatnonzero(subject.mask.any(0))
-    return 0.5 * np.array([columns[0] + columns[-1] + 1.0, rows[0] + rows[-1] + 1.0])
+    return np.array(box_of(subject.mask)).reshape(2, 2).mean(0)
 
 
 def _ray(point: F64) -> F64:

@@ -12,12 +12,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from objectmorpher_core import compose, lift, segment
 from objectmorpher_core.base.arrays import F32, F64, RGB, U8, Mask, unit_pixels
 from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.masks import dilated
 from objectmorpher_core.base.progress import Progress, part, silent
 from objectmorpher_core.compose import InpaintError
 from objectmorpher_core.compose.light.lighting import object_texture
@@ -272,8 +272,7 @@ def _degrees(motion: F64) -> float:
 def _covered(mask: Mask) -> Mask:
     """A's mask with the soft edge around it."""
     radius = max(1, round(COVER * float(np.hypot(*mask.shape))))
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
-    return cv2.dilate(mask.astype(np.uint8), kernel) > 0
+    return dilated(mask, radius)
 
 
 def _since(start: float) -> float:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64, RGB, Mask
+from objectmorpher_core.base.masks import largest_piece
 from objectmorpher_core.lift.crop import SIDE
 from objectmorpher_core.lift.shapes.rods import AROUND, INNER, MARGIN, SMALLEST
 
@@ -67,7 +68,7 @@ def _try(rng: np.random.Generator) -> RodSample | None:
     eye = _aim(rng)
     loose = eye._replace(width=2 * LOOSE / np.sqrt(max(eye.at @ eye.at - 1.0, 0.3)))
     mask, body = (_seen(one, loose, COARSE) for one in (solid, bare))
-    rod = _largest(mask & ~body)
+    rod = largest_piece(mask & ~body)
     if mask.sum() < LEAST or rod.sum() < SMALLEST * mask.sum():
         return None
     eye = _framed(rng, rod, body, loose)
@@ -137,11 +138,3 @@ def _seen(solid: Solid, eye: _Eye, side: int) -> Mask:
 def _enlarged(mask: Mask) -> Mask:
     large = cv2.resize(mask.astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_LINEAR)
     return np.asarray(large > 0.5)
-
-
-def _largest(mask: Mask) -> Mask:
-    """The largest connected piece."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
-    if count < 2:
-        return np.zeros_like(mask)
-    return np.asarray(labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()))

@@ -9,6 +9,7 @@ import numba as nb
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, Mask
+from objectmorpher_core.base.masks import box_of
 from objectmorpher_core.compose.shadow.shadow_look import SIDE, THING
 
 from .solids import (
@@ -209,14 +210,12 @@ def _window(
     mask = _seen(camera, ways, parts, shapes, wall)[0].reshape(FIRST_LOOK, FIRST_LOOK) == THING_SEEN
     if mask.sum() < LEAST:
         return None
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    ends = rows[0], columns[0], rows[-1], columns[-1]
-    if min(ends) == 0 or max(ends) == FIRST_LOOK - 1:
+    x0, y0, x1, y1 = box_of(mask)
+    if min(x0, y0) == 0 or max(x1, y1) == FIRST_LOOK:
         return None
     step = 2 * half / FIRST_LOOK
-    size = (max(np.ptp(rows), np.ptp(columns)) + 1) * step * SIDE / THING
-    x = -half + step * (columns[0] + columns[-1] + 1) / 2
-    y = half - step * (rows[0] + rows[-1] + 1) / 2
+    size = max(x1 - x0, y1 - y0) * step * SIDE / THING
+    x, y = -half + step * (x0 + x1) / 2, half - step * (y0 + y1) / 2
     return x - size / 2, y + size / 2, size
 
 

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, RGB, Mask
+from objectmorpher_core.base.masks import box_of
 from objectmorpher_core.lift.crop import SIDE
 
 from .distance import lowest, trace
@@ -137,8 +138,7 @@ def _framed(rng: np.random.Generator, solid: Solid, eye: _Eye) -> _Eye | None:
     mask = (out[:, 0] > 0).reshape(COARSE, COARSE)
     if mask.sum() < 12:
         return None
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    box = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]) / COARSE - 0.5
+    box = np.array(box_of(mask)) / COARSE - 0.5
     size = max(box[2] - box[0], box[3] - box[1]) + 1 / COARSE
     middle = 0.5 * (box[:2] + box[2:]) + rng.normal(0, 0.02, 2) * size
     pad = rng.uniform(*PAD)

@@ -39,5 +39,3 @@ FAMILIES: dict[str, Family] = {
     "extrusions": extrusions,
     "prints": prints,
 }
-
-__all__ = ["FAMILIES", "Family"]
