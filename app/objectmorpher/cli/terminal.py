@@ -14,7 +14,7 @@ PROGRAM = "objectmorpher"
 FAILURES = (ValueError, OSError, RuntimeError, MemoryError)  # that are one sentence for the user
 
 
-OURS = ("objectmorpher", "objectmorpher_core", "objectmorpher_research")
+OURS = "objectmorpher"  # the names of all our packages begin with it
 
 
 class UsageError(ValueError):
@@ -38,7 +38,7 @@ def is_librarys(error: BaseException) -> bool:
     if isinstance(error, OSError | MemoryError) or error.__traceback__ is None:
         return False
     *_, (frame, _) = walk_tb(error.__traceback__)
-    return frame.f_globals.get("__name__", "").partition(".")[0] not in OURS
+    return not frame.f_globals.get("__name__", "").startswith(OURS)
 
 
 @contextmanager

@@ -14,8 +14,7 @@ import numpy as np
 from objectmorpher.cli.options import WindowOptions
 from objectmorpher.gui.window.glfw_window import open_window
 import moderngl
-from objectmorpher.render.renderer import KeptCanvas
-from objectmorpher.render.row_copy import RowCopy
+from objectmorpher.render.renderer import KeptCanvas, RowCopy
 
 SIZE, VIEWPORT = (96, 80), (10, 20, 64, 48)
 handle = open_window(WindowOptions(size=SIZE, scale=1.0, frames=1))

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher.canvas.ghost import ghost
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
-from objectmorpher.tools.gizmo import TURNS, gizmo
+from objectmorpher.tools.gizmo import TURNS, ghost, gizmo
 from objectmorpher.tools.place_tool import SLOW, PlaceTool
 from objectmorpher.tools.pointer import Pointer, PointerShape
 from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix, wrapped

@@ -8,10 +8,9 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix
 from objectmorpher_core.document.model import Placement
 
-from ...canvas.ghost import ghost
 from ...editor.intents.placing import Placing
 from ...system.texts import t
-from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
+from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, ghost, gizmo
 from ..widgets.theme import theme
 from ..window.landmarks import mark_on_canvas
 from .canvas import ACCENT, DARK, WHITE, CanvasPainter
