@@ -109,7 +109,7 @@ do: depths sorted on the CPU, quads of three standard deviations, covariances co
 corner; it skins nothing, its frames are of what stands still. The *cloud* is plain Gaussians of
 1 to 3 px on a bumpy ball, the *lift* a photo-textured object that covers half of the view; both
 are dragged by one handle. *First* is the first frame of an object, with all that is done once.
-OpenGL: {gl}.{gsplat}
+OpenGL: {gl}.
 
 """
 
@@ -189,9 +189,7 @@ def write_page() -> str:
     edits = figures("pipeline", False)["rows"]
     render, deform = figures("render", False), figures("deform", False)
     gl = render["machine"]["gl_renderer"] or "not to be had"
-    has_gsplat = any(r["renderer"] == "gsplat-torch" for r in render["rows"])
-    gsplat = "" if has_gsplat else " gsplat and torch were not installed: no rows of theirs."
-    frames = FRAMES.format(gl=gl, gsplat=gsplat) + _frames(render["rows"])
+    frames = FRAMES.format(gl=gl) + _frames(render["rows"])
     budgets = _budgets(_budgets_of(edits, render["rows"], deform["rows"]))
     head = HEAD.format(machine=machine())
     whole = EDITS.format(backends=_backends(edits[0])) + _edits(edits)

@@ -52,7 +52,7 @@ class Row:
     """One object."""
 
     ours: Clicked
-    colors: Clicked  # GrabCut alone
+    colors: Clicked  # no learned model
     subject: float  # IoU of the photo's subject, no click
     box: list[float]  # IoU of the object's box, ours, and after each of BOX_CLICKS
     color_box: list[float]

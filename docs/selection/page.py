@@ -37,7 +37,7 @@ part may instead click the first place again, as the second click: that asks for
 two answers the better is kept. So a part is out of reach of the first click. *F* is the F measure
 of the outlines within 2 px; the frame is no outline. A refusal counts as nothing selected.
 
-Baselines in the same run: *GrabCut alone* (`--segment grabcut`: colours, no learned model; it
+Baselines in the same run: *colours alone* (`--segment grabcut`: no learned model; it
 gets the same kind of clicks, for its own errors) and *subject only* (`--segment subject`: no
 click). *Box*: one box around the object, no click, and then one click and two on the largest error.
 
@@ -98,7 +98,7 @@ def _means(rows: list[Row]) -> str:
             ours, box = [row.ours for row in chosen], [row.box for row in chosen]
             lines.append(_line([name, str(len(chosen)), *_mean_cells(ours), *_box_cells(box)]))
         colors, box = [row.colors for row in of_kind], [row.color_box for row in of_kind]
-        lines.append(_line(["– GrabCut alone", str(len(of_kind)), *_mean_cells(colors),
+        lines.append(_line(["– Colours alone", str(len(of_kind)), *_mean_cells(colors),
                             *_box_cells(box)]))  # fmt: skip
         subject = _number([row.subject for row in of_kind])
         lines.append(_line(["– subject only, no click", str(len(of_kind)), subject,
@@ -124,7 +124,7 @@ def _tables(rows: list[Row]) -> str:
              "three; parts after three. Dots are clicks, green for the object and red for what is "
              "not; yellow is missing, purple is too much.\n"]  # fmt: skip
     heads = ["", "IoU, 1 click", "2", "3", "F, 3 clicks", "Box", "and 1 click",
-             "GrabCut, 1 click", "3", "F", "Subject"]  # fmt: skip
+             "Colours, 1 click", "3", "F", "Subject"]  # fmt: skip
     for kind, title in KINDS:
         lines += [_line([title, *heads[1:]]), "|---" + "|---:" * (len(heads) - 1) + "|"]
         for row in rows:

@@ -19,7 +19,7 @@ from .pieces.features import main_directions
 from .pieces.pieces import Pieces
 from .pieces.view import PhotoView, PromptAnswer, Tokens
 from .salience import SubjectNet
-from .selection import SelectionError, check_mask, check_prompt, free_mask, is_bounded
+from .selection import SelectionError, check_prompt, obey
 
 Look = Callable[[PhotoView, Prompt, Progress], PromptAnswer]
 
@@ -87,13 +87,8 @@ class DinoWalk:
             raise SelectionError(f"the subject cannot be found: {self._subject.missing()}")
         progress(0.7, "walking from the clicks")
         seen = look(self._view_of(rgb, embedding), prompt, part(progress, 0.7, 1.0))
-        mask = seen.mask.copy()
-        if is_bounded(prompt):
-            mask &= free_mask(rgb.shape, prompt)
-        for click in prompt.clicks:
-            mask[int(click.y), int(click.x)] = click.is_foreground
         progress(1.0, "cut out the object")
-        return check_mask(mask), seen
+        return obey(seen.mask, prompt), seen
 
     def _view_of(self, rgb: RGB, embedding: Tokens) -> PhotoView:
         """The photo in pieces: the same for every click on it."""

@@ -120,6 +120,14 @@ def fill_small_holes(mask: Mask, prompt: Prompt) -> Mask:
     return mask | small[labels] if count > 1 else mask
 
 
+def obey(mask: Mask, prompt: Prompt) -> Mask:
+    """`mask` where the prompt lets what is meant be, with its clicks; see `check_mask`."""
+    mask = mask & free_mask(mask.shape, prompt)
+    for click in prompt.clicks:
+        mask[int(click.y), int(click.x)] = click.is_foreground
+    return check_mask(mask)
+
+
 def check_mask(mask: Mask) -> Mask:
     """`mask`, or SelectionError where it is a speck or covers the whole photo."""
     if mask.all():
@@ -144,5 +152,10 @@ def at_level(prompt: Prompt, find: Callable[[Prompt], Mask]) -> Mask:
         found = find(prompt)
     except SelectionError:
         return whole
-    found = found & whole if prompt.level == "part" else found | whole
-    return whole if found.all() or found.sum() < SMALLEST else found
+    return nest(found, whole, prompt.level)
+
+
+def nest(found: Mask, whole: Mask, level: str) -> Mask:
+    """A part (H, W) within its object `whole`, or a group around it; see `at_level`."""
+    nested = found & whole if level == "part" else found | whole
+    return whole if nested.all() or nested.sum() < SMALLEST else nested

@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import RGB, Mask
 from ...document.model import Click, Prompt
 from ..matting.edges import BAND, sharpen_band
-from ..selection import SMALLEST, fill_small_holes, is_bounded, keep_touched
+from ..selection import fill_small_holes, is_bounded, keep_touched, nest
 from .choice import (
     LARGER_CORRECTION,
     LARGER_FINE,
@@ -298,8 +298,7 @@ def begin(
     mask = sharpen_band(image, pieces.paint(choice.pieces), band=_band(pieces))
     mask = _tidy(mask, _reduced(pieces, prompt))
     if whole is not None:
-        nested = mask & whole if prompt.level == "part" else mask | whole
-        mask = whole if nested.all() or nested.sum() < SMALLEST else nested
+        mask = nest(mask, whole, prompt.level)
     return PieceAnswer(mask, choice.relative)
 
 

@@ -9,7 +9,7 @@ contrary may have the clearer outline, and the rest is meant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -37,6 +37,7 @@ LIKELY_ADDED = 0.25  # the same of what a click adds, which may be like nothing 
 ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
 AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
 LARGER = 0.03  # exponent: how much a larger region is preferred
+LARGER_BY_COLOR = 0.15  # the same without tokens: colours part an object's own parts, too
 FREE_FRAME = 4.0  # exponent: how much what is not the subject should leave the frame free
 SURE_SALIENCE = 0.9
 SMALLEST_SUBJECT = 0.1  # x area of the subject's largest piece
@@ -88,6 +89,11 @@ class PieceGround:
     salience: F32 | None  # (h, w) subject map at the pieces' size
     is_of_large: bool = False  # of a large photo, or of a tile of one
     tokens: F32 | None = None  # (r, c, d) of the photo
+
+    @property
+    def larger(self) -> float:
+        """Exponent: how much a larger region is preferred."""
+        return LARGER_BY_COLOR if self.tokens is None else LARGER
 
     def free(self, prompt: Prompt) -> Mask:
         """(h, w) where the prompt lets what is meant be, at the pieces' size."""
@@ -267,7 +273,7 @@ def _group(ground: PieceGround, click: Click, whole: Mask) -> Mask:
     growth = pieces.grow(pieces.at(click.x, click.y))
     larger = [pieces.region(growth, k) | whole for k in growth.peaks()]
     larger = [m for m in larger if pieces.share(m) > LARGER_GROUP * pieces.share(whole)]
-    plain = PieceGround(pieces, None)
+    plain = replace(ground, salience=None)
     scored = [(_score(plain, mask, None), k) for k, mask in enumerate(larger) if not mask.all()]
     best, k = max(scored, default=(0.0, -1))
     group = larger[k] if best > WORTH_A_GROUP * _score(plain, whole, None) else whole
@@ -349,7 +355,7 @@ def _score(ground: PieceGround, mask: Mask, subject: F64 | None, is_boxed: bool 
         either = (np.maximum(mask, subject) * pieces.area).sum()
         return float(contrast * (both / max(either, 1e-6)) ** AGREEMENT)
     share, frame = pieces.share(mask), pieces.frame[mask].sum()
-    score = contrast * (1 - frame) ** FREE_FRAME * (1 - share**2) * share**LARGER
+    score = contrast * (1 - frame) ** FREE_FRAME * (1 - share**2) * share**ground.larger
     if ground.salience is not None and not is_boxed:  # another subject is not meant
         other = pieces.mean(ground.salience) * pieces.area
         score *= 1 - other[mask].sum() / max(other.sum(), 1.0)

@@ -188,15 +188,21 @@ class Growth:
 class Pieces:
     """Precomputed for a photo (H, W, 3) and its tokens (h, w, d), if any: about `count` pieces.
 
-    A walk goes as far as among pieces of the side `like` px, where that is given.
+    A walk goes as far as among pieces of the side `like` px, where that is given. `photo_shape`
+    (H, W) is the photo's own, where `rgb` is a smaller picture of it.
     """
 
     _stamina = STAMINA
 
     def __init__(
-        self, rgb: RGB, tokens: F32 | None, count: int = PIECES, like: float | None = None
+        self,
+        rgb: RGB,
+        tokens: F32 | None,
+        count: int = PIECES,
+        like: float | None = None,
+        photo_shape: tuple[int, int] | None = None,
     ) -> None:
-        self.photo_shape = rgb.shape[:2]
+        self.photo_shape = photo_shape or rgb.shape[:2]
         image = reduced(rgb)
         self.shape = height, width = image.shape[:2]
         lab = np.asarray(

@@ -13,7 +13,7 @@ from ...base.arrays import F32, RGB, Mask, frozen
 from ...base.progress import Progress, part
 from ...document.model import Click, Prompt
 from ..matting.edges import enlarge
-from ..selection import cropped
+from ..selection import cropped, nest
 from .answers import PieceAnswer, add_click, begin, confidence, expected_overlap, vote
 from .choice import PieceChoice, PieceGround, PieceRegion, choose
 from .features import crop_tokens
@@ -42,7 +42,7 @@ Encode = Callable[[RGB, Progress], F32]  # picture -> (h, w, d) tokens
 class Tokens:
     """Tokens of a photo, patch by patch and piece by piece."""
 
-    tokens: F32  # (h, w, 64) unit length
+    tokens: F32 | None  # (h, w, 64) unit length; None where colours are all there is
     salience: F32 | None  # (320, 320) in [0, 1]; None without the subject network's weights
     pieces: Pieces
 
@@ -164,8 +164,7 @@ class PhotoView:
         seen = self._look_within(steps, whole.mask, at_once, part(progress, 0.3, 1.0))
         mask = seen.mask
         if len(steps) == 1:  # at the photo's size, too
-            nested = mask & whole.mask if prompt.level == "part" else mask | whole.mask
-            mask = nested if nested.any() and not nested.all() else whole.mask
+            mask = nest(mask, whole.mask, prompt.level)
         return PromptAnswer(mask, seen.sureness, seen.is_final and whole.is_final)
 
     def _look_within(
@@ -292,6 +291,7 @@ class PhotoView:
             if is_anew:
                 tokens = self._encode(crop, part(progress, 0.1, 0.3))
             else:
+                assert self.embedding.tokens is not None, "a closer look is by tokens"
                 tokens = crop_tokens(self.embedding.tokens, photo, box)
             if salience is not None:
                 salience = _crop_map(salience, photo, box)

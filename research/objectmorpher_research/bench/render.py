@@ -16,7 +16,7 @@ from objectmorpher_core.raster.binning import bin_tiles, depth_order
 from objectmorpher_core.raster.projection import project
 from objectmorpher_core.raster.rules import Z
 
-from . import gl, gsplat_torch
+from . import gl
 from .scenes import VIEW, BenchScene, Row, cloud_scene, lift_scene
 from .timing import Effort, Timing, measure
 
@@ -52,7 +52,6 @@ def bench_render(is_quick: bool) -> tuple[list[Row], str | None]:
             for size in plan.sizes:
                 view = scene.sized(size)
                 rows += [tiles_row(view, plan.effort), *drawer.rows(view, plan.effort)]
-                rows += gsplat_torch.rows(view, plan.effort)
     return rows, drawer.name
 
 

@@ -70,7 +70,7 @@ class _Networks:
         self._folder = folder
         self.used: dict[str, str] = {}  # sha256 by the file's name
         self._dino = dino.Dino()
-        self._features: dict[str, Features] = {}  # by the network's id
+        self._fid: Features | None = None
 
     def file(self, id: str) -> Path:
         path, self.used[path.name] = trunk_files.checked(id, self._folder)
@@ -95,22 +95,14 @@ class _Networks:
     def fid_features(self) -> Features:
         from .measures.inception_measures import FidFeatures
 
-        return self._once("fid-inception", FidFeatures)
-
-    def efficientnet_features(self) -> Features:
-        from .measures.efficientnet import WEIGHT, EfficientNetFeatures
-
-        return self._once(WEIGHT, EfficientNetFeatures)
+        path = self.file("fid-inception")
+        if self._fid is None:
+            self._fid = FidFeatures(path)
+        return self._fid
 
     def dino(self) -> dino.Dino:
         self.file(dino.WEIGHT)
         return self._dino
-
-    def _once(self, id: str, opened: Callable[[Path], Features]) -> Features:
-        path = self.file(id)
-        if id not in self._features:
-            self._features[id] = opened(path)
-        return self._features[id]
 
 
 def _frechet(x: F64, y: F64) -> Estimate:
@@ -135,8 +127,6 @@ AS_SETS: Mapping[str, Callable[[_Networks], Features]] = {
     "fid": lambda networks: networks.fid_features(),
     "kid": lambda networks: networks.fid_features(),
     "kid-paired": lambda networks: networks.fid_features(),
-    "efficientnet-kid": lambda networks: networks.efficientnet_features(),
-    "efficientnet-kid-paired": lambda networks: networks.efficientnet_features(),
     "dinov2-mmd-paired": lambda networks: networks.dino().picture,
 }
 METRICS = (*ONE_BY_ONE, *AS_SETS)
@@ -241,8 +231,6 @@ def _distances(subsets: Subsets) -> Mapping[str, Distance]:
         "fid": _frechet,
         "kid": partial(kid, subsets=subsets),
         "kid-paired": paired_kid,
-        "efficientnet-kid": partial(kid, subsets=subsets),
-        "efficientnet-kid-paired": paired_kid,
         "dinov2-mmd-paired": paired_kid,
     }
 

@@ -91,7 +91,7 @@ def test_what_only_evaluation_needs_is_not_missed_and_not_got_unasked(capsys, mo
     code, out, err = said(capsys, "verify")
     assert code == 1 and "hed-vgg" not in out + err and "dinov2-vits14: missing" in out
     monkeypatch.setenv(models.OFFLINE, "1")
-    for id in ("hed-vgg", "efficientnet-lite0", "lpips-alex"):
+    for id in ("hed-vgg", "lpips-alex"):
         code, _, err = said(capsys, "get", id)
         assert code == 1 and id in err
     assert {w.id for w in models.weights() if w.category == "edit"} == {"dinov2-vits14", "u2netp"}

@@ -23,7 +23,7 @@ from objectmorpher_research.bench.timing import seconds
 CONTRACT = {"renderer", "gaussians", "width", "height", "sort_ms", "frame_ms"}
 ALWAYS = CONTRACT | {"scene", "frame_least_ms", "first_frame_ms", "solve_ms"}
 PARTS = {"project_ms", "bin_ms", "draw_ms"}
-PEERS = {"gl", "classic-gl", "gsplat-torch"}  # each where it runs
+PEERS = {"gl", "classic-gl"}  # each where it runs
 PIXEL = 3 / 255  # mean over the picture: 8 bits a blending, and quads that end at 3 sigma
 
 

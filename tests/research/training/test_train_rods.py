@@ -26,7 +26,7 @@ def test_the_azimuth_is_that_of_the_handle():
     for seed in range(12):
         rng = np.random.default_rng(seed)
         built = make_vessel(rng)
-        solid, eye = built.finish(), rods._aim(rng)
+        solid, eye = built.finish(), rods._aim(rng, rods._any_turn)
         rays, _ = rods._rays(eye, 64)
         out = np.zeros((len(rays), 16))
         trace(rays, eye.at, solid, np.zeros((0, 3)), rods.NO_GROUND, 0, len(rays), out)

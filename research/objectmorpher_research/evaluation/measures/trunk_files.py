@@ -32,12 +32,10 @@ NEEDS: Mapping[str, tuple[str, ...]] = {  # ids of trunks and weights by the mea
     "sifid-64": ("inception-v3",), "sifid-192": ("inception-v3",), "sifid-768": ("inception-v3",),
     "fid": ("fid-inception",), "kid": ("fid-inception",), "kid-paired": ("fid-inception",),
     "hed-vgg-perceptual": ("hed-vgg",),
-    "efficientnet-kid": ("efficientnet-lite0",), "efficientnet-kid-paired": ("efficientnet-lite0",),
     "dinov2-perceptual": ("dinov2-vits14",), "dinov2-identity": ("dinov2-vits14",),
     "dinov2-mmd-paired": ("dinov2-vits14",),
 }  # fmt: skip
-OWN = ("dinov2-vits14", "hed-vgg", "efficientnet-lite0")  # of measures under names of their own
-TORCH_FREE = ("dinov2-vits14", "hed-vgg")  # they run in onnxruntime
+OWN = ("dinov2-vits14", "hed-vgg")  # of measures under names of their own; they run in onnxruntime
 HEADS = {  # weights that the user may have as files, too, and what they are called then
     "lpips-alex": ("lpips-v0.1-alex.pth", "alex.pth"),
     "lpips-vgg": ("lpips-v0.1-vgg.pth", "vgg.pth"),
@@ -49,7 +47,7 @@ def why_missing(measure: str, folder: Path | None = None) -> str | None:
     for id in NEEDS.get(measure, ()):
         if find(id, folder) is None:
             return _told_missing(id, folder)
-        if id not in TORCH_FREE and not device.has_torch():
+        if id not in OWN and not device.has_torch():
             return f"PyTorch is needed: {models.EXTRA}"
     return None
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -26,3 +28,16 @@ def looked_up(
         for k in range(0, len(x), AT_ONCE)
     ]
     return np.concatenate(parts).astype(np.float64) if parts else np.zeros((0, channels))
+
+
+def triplanar(look: Callable[[F64], F64], at: F64, normals: F64) -> F64:
+    """(n, 3) of a picture laid around places (n, 3) with normals (n, 3) from three sides.
+
+    `look` gives the colours (n, 3) of places (n, 2) in the picture's plane.
+    """
+    weights = np.abs(normals) ** 4
+    weights /= np.maximum(weights.sum(1, keepdims=True), 1e-12)
+    total = np.zeros((len(at), 3))
+    for axis, (u, v) in enumerate(((2, 1), (0, 2), (0, 1))):
+        total += weights[:, axis, None] * look(at[:, [u, v]])
+    return total

@@ -14,15 +14,12 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, RGB
 
-from ..error import EvaluationError
-from .lookup import looked_up
+from ...photos import photo
+from .lookup import looked_up, triplanar
 
 BACKGROUNDS = ("coffee", "china", "astronaut", "flower", "chelsea", "rocket")
 SURFACES = ("retina", "coins", "camera", "moon", "page", "text", "clock", "flower")
 GAMMA = 2.2
-MISSING = (
-    "the photos of scikit-image and scikit-learn are needed: pip install 'objectmorpher[research]'"
-)
 
 
 @dataclass(frozen=True)
@@ -40,15 +37,14 @@ class SolidMaterial:
         if self.surface == "marble":
             return marble(points, self.seed)
         picture, start = surface(self.surface), 40.0 * self.seed
-        weights = np.abs(normals) ** 4
-        weights /= np.maximum(weights.sum(1, keepdims=True), 1e-12)
-        total = np.zeros((len(points), 3))
-        for axis, (u, v) in enumerate(((2, 1), (0, 2), (0, 1))):
-            at = (points[:, [u, v]] + 0.5) * self.scale + start
-            size = np.array(picture.shape[1::-1]) - 1.0
+        size = np.array(picture.shape[1::-1]) - 1.0
+
+        def look(places: F64) -> F64:
+            at = (places + 0.5) * self.scale + start
             folded = size - np.abs(np.mod(at, 2 * size) - size)  # mirrored at the picture's ends
-            total += weights[:, axis, None] * looked_up(picture, folded)
-        return np.clip(total * self.tint, 0.0, 1.0)
+            return looked_up(picture, folded)
+
+        return np.clip(triplanar(look, points, normals) * self.tint, 0.0, 1.0)
 
 
 def marble(points: F64, seed: int) -> F64:
@@ -90,22 +86,3 @@ def background(name: str, width: int, height: int) -> RGB:
     large = cv2.resize(whole, size, interpolation=how)
     top, left = (size[1] - height) // 2, (size[0] - width) // 2
     return np.ascontiguousarray(large[top : top + height, left : left + width], np.uint8)
-
-
-@cache
-def photo(name: str) -> RGB:
-    """(h, w, 3) of a photo that comes with scikit-image or scikit-learn. Raises EvaluationError."""
-    try:
-        from skimage import data
-        from sklearn.datasets import load_sample_image
-    except ImportError as error:
-        raise EvaluationError(MISSING) from error
-    try:
-        if name in ("flower", "china"):
-            pixels = load_sample_image(f"{name}.jpg")
-        else:
-            pixels = np.asarray(getattr(data, name)())
-    except OSError as error:  # some photos of scikit-image come by the network
-        raise EvaluationError(f"scikit-image's photo {name!r} is not here: {error}") from error
-    colour = pixels if pixels.ndim == 3 else np.repeat(pixels[..., None], 3, 2)
-    return np.asarray(colour, np.uint8)

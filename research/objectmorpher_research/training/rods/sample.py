@@ -15,11 +15,9 @@ from objectmorpher_core.lift.shapes.rods import AROUND, INNER, MARGIN, SMALLEST
 from ..shapes.distance import lowest, trace
 from ..shapes.sample import (
     COLUMNS,
-    FIELDS,
     LOOSE,
-    NEAREST,
     NO_GROUND,
-    SHARES,
+    _aim,
     _developed,
     _Eye,
     _lamps,
@@ -65,7 +63,7 @@ def _try(rng: np.random.Generator) -> RodSample | None:
     built = make_vessel(rng)
     solid = built.finish()
     bare = solid._replace(parts=solid.parts[:-1], bounds=solid.bounds[:-1])
-    eye = _aim(rng)
+    eye = _aim(rng, _any_turn)
     loose = eye._replace(width=2 * LOOSE / np.sqrt(max(eye.at @ eye.at - 1.0, 0.3)))
     mask, body = (_seen(one, loose, COARSE) for one in (solid, bare))
     rod = largest_piece(mask & ~body)
@@ -88,17 +86,10 @@ def _try(rng: np.random.Generator) -> RodSample | None:
     return RodSample(_developed(rng, np.maximum(picture, 0)), seen, rod, *_angles(eye, middle))
 
 
-def _aim(rng: np.random.Generator) -> _Eye:
-    field = np.radians(rng.uniform(*FIELDS))
-    width = 2 * np.tan(field / 2) * rng.uniform(*SHARES)  # tangents
-    away = max(NEAREST, 1.25 / np.sin(np.arctan(width / 2)) / np.sqrt(2.0))
+def _any_turn(rng: np.random.Generator) -> F64:
+    """(3, 3) for `_aim`."""
     azimuth, pitch = np.radians(rng.uniform(*AZIMUTHS)), np.radians(rng.uniform(*PITCHES))
-    axes = turned(0, pitch, np.radians(rng.normal(0, ROLL))) @ turned(-azimuth).T
-    axes = np.diag([1.0, -1.0, -1.0]) @ axes
-    room = 0.5 * max(2 * np.tan(field / 2) - width, 0.0)
-    middle = rng.uniform(-room, room, 2) * [1.0, 0.6]
-    forward = np.array([*middle, 1.0])
-    return _Eye(-away * (axes.T @ (forward / np.linalg.norm(forward))), axes, middle, width)
+    return turned(0, pitch, np.radians(rng.normal(0, ROLL))) @ turned(-azimuth).T
 
 
 def _framed(rng: np.random.Generator, rod: Mask, body: Mask, loose: _Eye) -> _Eye:

@@ -8,8 +8,11 @@ from functools import cache
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32, F64
+from objectmorpher_core.base.arrays import F32, F64, RGB
 from objectmorpher_core.compose.shadow.shadow import GAMMA
+
+from ...evaluation.error import EvaluationError
+from ...photos import photo
 
 SIDE = 512  # px of a texture
 LEVELS = 6  # of its pyramid
@@ -31,23 +34,19 @@ SCENIC = 3  # the first of them are whole scenes
 @cache
 def photographs() -> tuple[F32, ...]:
     """(h, w, 3) linear, those that are here; scenes of the world come first."""
-    from skimage import data
-    from sklearn.datasets import load_sample_image
-
-    shown = [load_sample_image("china.jpg")]
+    shown = [photo("china")]
     for name in PHOTOGRAPHS:
         try:
-            shown.append(getattr(data, name)())
-        except (OSError, ImportError, ValueError):  # it would have to be fetched
+            shown.append(photo(name))
+        except EvaluationError:  # it would have to be fetched
             continue
     return tuple(_linear(image) for image in shown)
 
 
-def _linear(image: np.ndarray) -> F32:
-    image = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
+def _linear(image: RGB) -> F32:
     scale = min(LONGEST / max(image.shape[:2]), 1.0)
-    image = cv2.resize(image[..., :3], None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return np.asarray((image / 255.0) ** GAMMA, np.float32)
+    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return np.asarray((small / 255.0) ** GAMMA, np.float32)
 
 
 def any_colour(rng: np.random.Generator) -> F64:

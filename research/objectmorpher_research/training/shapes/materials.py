@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64
 
-from ...evaluation.truth.lookup import looked_up
+from ...evaluation.truth.lookup import looked_up, triplanar
+from ...photos import photo
 
 PLAIN, PHOTO, GRAIN, STRIPES, CHECKS, PRINT, SPOTS, FACE = range(8)
 WEIGHTS = (0.22, 0.27, 0.17, 0.09, 0.05, 0.12, 0.08)  # how often each but the last is chosen
 SMALLEST_CROP = 90  # px of a photograph
+LONGEST = 640  # px of one
+PHOTOGRAPHS = (
+    "astronaut", "chelsea", "coffee", "rocket", "brick", "grass", "gravel", "hubble_deep_field",
+    "immunohistochemistry", "motorcycle", "china",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,18 +41,11 @@ class Material:
 
 @cache
 def photographs() -> tuple[F32, ...]:
-    """(h, w, 3) linear pictures in [0, 1] of scikit-image and scikit-learn."""
-    from skimage import data
-    from sklearn.datasets import load_sample_image
-
-    names = ("astronaut", "chelsea", "coffee", "rocket", "brick", "grass", "gravel")
-    names = (*names, "hubble_deep_field", "immunohistochemistry")
-    shown = [getattr(data, name)() for name in names]
-    shown += [data.stereo_motorcycle()[0], load_sample_image("china.jpg")]
+    """(h, w, 3) linear pictures in [0, 1]. Raises EvaluationError where one is not here."""
     pictures = []
-    for image in shown:
-        image = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
-        scale = 640 / max(image.shape[:2])
+    for name in PHOTOGRAPHS:
+        image = photo(name)
+        scale = LONGEST / max(image.shape[:2])
         small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         pictures.append(linear(np.asarray(small, np.float32) / np.float32(255)))
     return tuple(pictures)
@@ -124,7 +123,7 @@ def albedo(material: Material, at: F64, normal: F64, noise: F32) -> F64:
         return _looked_up(material.picture, 0.5 * (place[:, :2] + 1))
     if material.kind == PHOTO:
         assert material.picture is not None
-        return _triplanar(material.picture, 0.5 * place, normal)
+        return triplanar(partial(_looked_up, material.picture), 0.5 * place, normal)
     if material.kind == GRAIN:  # wood, marble, fur: noise along one axis
         share = grain(noise, place * [1.0, 4.0, 4.0])
         return first + (second - first) * _ramp(share, 0.35, 0.65)[:, None]
@@ -169,15 +168,6 @@ def _trilinear(noise: F32, at: F64) -> F64:
         index = (low + step) % size
         weight = np.where(step, t, 1 - t).prod(1)
         total += weight * noise[index[:, 0], index[:, 1], index[:, 2]]
-    return total
-
-
-def _triplanar(picture: F32, at: F64, normal: F64) -> F64:
-    weights = np.abs(normal) ** 4
-    weights /= weights.sum(1, keepdims=True)
-    total = np.zeros((len(at), 3))
-    for axis, (u, v) in enumerate(((2, 1), (0, 2), (0, 1))):
-        total += weights[:, axis : axis + 1] * _looked_up(picture, at[:, [u, v]])
     return total
 
 

@@ -5,7 +5,9 @@ Its units are those of `lift.crop`, in which the network sees a photo.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import cv2
@@ -90,7 +92,8 @@ def _try(rng: np.random.Generator, name: str, side: int) -> Sample | None:
     if not built.prints and rng.random() < 0.1:
         built.bend = float(np.clip(rng.normal(0, 0.25), -BENT, BENT))
     solid = built.finish()
-    eye = _aim(rng, FACED_PRINT if built.prints else FACED)
+    faced = FACED_PRINT if built.prints else FACED
+    eye = _aim(rng, partial(_any_turn, faced=faced))
     ground = lowest(solid, COLUMNS) if eye.axes[2, 1] < -0.05 and rng.random() < 0.75 else NO_GROUND
     eye = _framed(rng, solid, eye)
     if eye is None:
@@ -107,26 +110,27 @@ def _try(rng: np.random.Generator, name: str, side: int) -> Sample | None:
     return _measured(rng, name, eye, out, lengths, mask, picture)
 
 
-def _aim(rng: np.random.Generator, faced: float) -> _Eye:
+def _aim(rng: np.random.Generator, turn: Callable[[np.random.Generator], F64]) -> _Eye:
     """A camera that looks at the object's middle, which is somewhere in its picture.
 
-    `faced`: how often it stands before the object.
+    `turn` draws how the object (y up, its front towards +z) is turned (3, 3) before the camera.
     """
     field = np.radians(rng.uniform(*FIELDS))
-    share = rng.uniform(*SHARES)
-    width = 2 * np.tan(field / 2) * share  # tangents
+    width = 2 * np.tan(field / 2) * rng.uniform(*SHARES)  # tangents
     away = max(NEAREST, 1.25 / np.sin(np.arctan(width / 2)) / np.sqrt(2.0))
-    pitch = np.radians(rng.choice([rng.uniform(-5, 35), rng.uniform(-50, 88)], p=[0.75, 0.25]))
-    yaw = rng.normal(0, 0.7) if rng.random() < faced else rng.uniform(0, 2 * np.pi)
-    axes = turned(yaw).T  # turns the object about the upright; what has a front looks along +z
-    axes = turned(0, pitch, np.radians(rng.normal(0, 6))) @ axes
+    down = np.diag([1.0, -1.0, -1.0])  # y up, towards the camera -> y down, forward
+    axes = down @ turn(rng)
     room = 0.5 * max(2 * np.tan(field / 2) - width, 0.0)
     middle = rng.uniform(-room, room, 2) * [1.0, 0.6]
-    down = np.diag([1.0, -1.0, -1.0])  # y up, towards the camera -> y down, forward
-    axes = down @ axes
-    forward = np.array([middle[0], middle[1], 1.0])
-    at = -away * (axes.T @ (forward / np.linalg.norm(forward)))
-    return _Eye(at, axes, middle, width)
+    forward = np.array([*middle, 1.0])
+    return _Eye(-away * (axes.T @ (forward / np.linalg.norm(forward))), axes, middle, width)
+
+
+def _any_turn(rng: np.random.Generator, faced: float) -> F64:
+    """(3, 3) for `_aim`; `faced`: how often the camera stands before the object."""
+    pitch = np.radians(rng.choice([rng.uniform(-5, 35), rng.uniform(-50, 88)], p=[0.75, 0.25]))
+    yaw = rng.normal(0, 0.7) if rng.random() < faced else rng.uniform(0, 2 * np.pi)
+    return turned(0, pitch, np.radians(rng.normal(0, 6))) @ turned(yaw).T
 
 
 def _framed(rng: np.random.Generator, solid: Solid, eye: _Eye) -> _Eye | None:

@@ -1,7 +1,7 @@
-"""HED-VGG perceptual and EfficientNet-KID: the networks are what they are said to be, and measure.
+"""HED-VGG perceptual: the network is what it is said to be, and measures.
 
-On random weights against transcriptions; with the real ones, where the cache has them, by what they
-were trained for: edges where people draw outlines, and the names of what photos show.
+On random weights against a transcription; with the real ones, where the cache has them, by what
+they were trained for: edges where people draw outlines.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ import pytest
 from objectmorpher_core import models
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_research.evaluation.error import EvaluationError
-from objectmorpher_research.evaluation.measures import efficientnet, hed_vgg
-from objectmorpher_research.evaluation.measures.efficientnet import EfficientNetFeatures
+from objectmorpher_research.evaluation.measures import hed_vgg
 from objectmorpher_research.evaluation.measures.hed_vgg import (
     HedVgg,
     read_arrays,
@@ -28,13 +27,12 @@ from objectmorpher_research.evaluation.measures.hed_vgg import (
 from objectmorpher_research.evaluation.metrics import Choices, measure
 from objectmorpher_research.evaluation.pairs import find_pairs
 from tests.photos import photo
-from tests.research.evaluation.measures.random_weights import random_state
 
 pytestmark = pytest.mark.slow
 
 F32 = 1e-4  # relative, of sums of some thousand products
 SMALL = 96  # px
-CLASSES = {"chelsea": {281, 282, 285}, "coffee": {967, 968, 504}}  # of ImageNet: cats, cups
+PHOTOS = ("chelsea", "coffee")
 
 
 def noisy(rgb: np.ndarray, sigma: float) -> np.ndarray:
@@ -168,78 +166,6 @@ def test_more_noise_is_farther_and_another_photo_farthest(real_hed):
     assert 0 < far[0] < far[1] < far[2] < 1
 
 
-def transcribed_efficientnet(state: Any, pixels: Any) -> Any:
-    """EfficientNet-Lite0 as modules in a row, from the paper's table 1 and Lite's differences."""
-    torch = pytest.importorskip("torch")
-    nn = torch.nn
-    left = iter(state.items())  # in the order of the layers: each is taken once
-
-    def take(module: Any, names: int) -> Any:
-        for field, (_, tensor) in zip(("weight", "bias", "running_mean", "running_var")[:names],
-                                      left, strict=False):  # fmt: skip
-            getattr(module, field).data = tensor
-        return module.eval()
-
-    def layer(before: int, after: int, size: int, stride: int, groups: int) -> Any:
-        # TensorFlow pads an even side less at its start where the stride is 2.
-        start, end = ((size - 2) // 2, (size - 1) // 2) if stride == 2 else (size // 2, size // 2)
-        conv = nn.Conv2d(before, after, size, stride, groups=groups, bias=False)
-        pad = nn.ZeroPad2d((start, end, start, end))
-        return nn.Sequential(pad, take(conv, 1), take(nn.BatchNorm2d(after, eps=1e-3), 4))
-
-    x = nn.ReLU6()(layer(3, 32, 3, 2, 1)(pixels))
-    before = 32
-    for widening, after, count, stride, size in (
-        (1, 16, 1, 1, 3), (6, 24, 2, 2, 3), (6, 40, 2, 2, 5), (6, 80, 3, 2, 3),
-        (6, 112, 3, 1, 5), (6, 192, 4, 2, 5), (6, 320, 1, 1, 3),
-    ):  # fmt: skip
-        for k in range(count):
-            inner, wide = x, before * widening
-            if widening > 1:
-                inner = nn.ReLU6()(layer(before, wide, 1, 1, 1)(inner))
-            inner = nn.ReLU6()(layer(wide, wide, size, 1 if k else stride, wide)(inner))
-            inner = layer(wide, after, 1, 1, 1)(inner)
-            x = x + inner if k else inner
-            before = after
-    found = nn.ReLU6()(layer(320, 1280, 1, 1, 1)(x))
-    assert next(left, None) is None
-    return found
-
-
-def test_efficientnet_is_what_was_published(tmp_path):
-    torch = pytest.importorskip("torch")
-    wanted = efficientnet.shapes()
-    learned = sum(int(np.prod(shape)) for name, shape in wanted.items() if "running" not in name)
-    assert learned + 1281 * 1000 == 4_652_008  # with the classifier: 4.7 M as published
-    state = random_state(wanted)
-    torch.save(state, tmp_path / "weights.pth")
-    pixels = torch.rand(1, 3, SMALL, SMALL) * 2 - 1
-    with torch.no_grad():
-        found = EfficientNetFeatures(tmp_path / "weights.pth").places(pixels)
-        expected = transcribed_efficientnet(state, pixels)
-    assert found.shape == expected.shape == (1, 1280, 3, 3)
-    assert float((found - expected).abs().max()) < F32 * float(expected.max())
-
-
-@pytest.fixture(scope="module")
-def real_features() -> EfficientNetFeatures:
-    pytest.importorskip("torch")
-    path = models.path(efficientnet.WEIGHT)
-    if path is None:
-        pytest.skip("efficientnet-lite0 is not in the cache")
-    return EfficientNetFeatures(path)
-
-
-@pytest.mark.parametrize("name", CLASSES)
-def test_the_real_network_knows_what_photos_show(real_features, name):
-    """Its classifier on our features: resize, normalisation and every layer are as trained."""
-    torch = pytest.importorskip("torch")
-    path = models.path(efficientnet.WEIGHT)
-    state = torch.load(path, map_location="cpu", weights_only=True)
-    scores = state["_fc.weight"].numpy() @ real_features(photo(name)) + state["_fc.bias"].numpy()
-    assert int(np.argmax(scores)) in CLASSES[name]
-
-
 Folders = Callable[[str, list[np.ndarray]], Any]
 
 
@@ -254,19 +180,16 @@ def folder(tmp_path) -> Folders:
     return write
 
 
-def test_they_are_measured_beside_the_others(real_hed, real_features, folder):
-    crops = [photo(n)[y : y + SMALL, 40 : 40 + SMALL].copy() for n in CLASSES for y in (0, 60, 120)]
+def test_it_is_measured_beside_the_others(real_hed, folder):
+    crops = [photo(n)[y : y + SMALL, 40 : 40 + SMALL].copy() for n in PHOTOS for y in (0, 60, 120)]
     a, b = folder("a", crops), folder("b", [noisy(rgb, 30) for rgb in crops])
-    names = ("hed-vgg-perceptual", "efficientnet-kid", "efficientnet-kid-paired")
+    names = ("hed-vgg-perceptual", "psnr")
     results = measure(find_pairs(a, b), Choices(names))
     found = {score.metric: score.estimate.value for score in results.scores}
-    assert set(found) == set(names) and found["efficientnet-kid-paired"] > 0
-    assert set(results.weights.values()) == {
-        models.weight(id).sha256 for id in (hed_vgg.WEIGHT, efficientnet.WEIGHT)
-    }
+    assert set(found) == set(names) and found["hed-vgg-perceptual"] > 0
+    assert set(results.weights.values()) == {models.weight(hed_vgg.WEIGHT).sha256}
     same = {s.metric: s.estimate.value for s in measure(find_pairs(a, a), Choices(names)).scores}
-    assert same["hed-vgg-perceptual"] == 0 and same["efficientnet-kid"] < 0
-    assert same["efficientnet-kid-paired"] == pytest.approx(0, abs=1e-9)
+    assert same["hed-vgg-perceptual"] == 0
 
 
 def test_without_their_weights_it_is_said(monkeypatch, tmp_path, folder):
@@ -274,7 +197,6 @@ def test_without_their_weights_it_is_said(monkeypatch, tmp_path, folder):
     a = folder("a", [photo("coffee")[:40, :40].copy()] * 2)
     lacking = {left.metric: left.reason for left in measure(find_pairs(a, a), Choices()).lacking}
     assert "objectmorpher models get hed-vgg" in lacking["hed-vgg-perceptual"]
-    assert "objectmorpher models get efficientnet-lite0" in lacking["efficientnet-kid-paired"]
     assert "objectmorpher models add alexnet FILE" in lacking["lpips-alex"]
     with pytest.raises(EvaluationError, match="hed-vgg-perceptual cannot be measured"):
         measure(find_pairs(a, a), Choices(("hed-vgg-perceptual",)))

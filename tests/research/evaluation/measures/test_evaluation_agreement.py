@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objectmorpher_core import models
-from objectmorpher_research.evaluation.measures.efficientnet import WEIGHT, EfficientNetFeatures
 from objectmorpher_research.evaluation.measures.fidelity import psnr, ssim
 from objectmorpher_research.evaluation.measures.frechet import frechet_of_samples
 from objectmorpher_research.evaluation.measures.inception import DEEPEST, Inception
@@ -54,7 +52,7 @@ def crops() -> tuple[np.ndarray, np.ndarray]:
 
 
 class Embedding(torch.nn.Module):
-    """What a measure of sets looks at: our own network, or numbers of a random projection."""
+    """What a measure of sets looks at."""
 
     def __init__(self, ours: Any) -> None:
         super().__init__()
@@ -67,10 +65,7 @@ class Embedding(torch.nn.Module):
 
 @pytest.fixture(scope="module")
 def features() -> Any:
-    """(d,) of a picture."""
-    path = models.path(WEIGHT)
-    if path is not None:
-        return EfficientNetFeatures(path)
+    """(48,) of a picture, a random projection."""
     mixed = np.random.default_rng(1).normal(size=(48, 12 * 12 * 3)) / 20
 
     def project(rgb: np.ndarray) -> np.ndarray:
