@@ -193,6 +193,7 @@ def test_the_edge_of_a_moved_object_is_repaired_where_it_is_seen(
     assert editor.committed is before
 
 
+@pytest.mark.slow
 def test_the_shape_follows_an_edge_that_is_hardened_again_after_undo(
     editor: Editor, ball: Document
 ) -> None:
@@ -228,6 +229,7 @@ def test_the_shape_follows_a_step_that_was_undone_while_it_was_made_ready(
     assert editor.history.undo_label == "Grow selection"
 
 
+@pytest.mark.slow
 def test_the_backgrounds_colour_goes_out_of_the_edge_and_comes_back(
     editor: Editor, ball: Document
 ) -> None:

@@ -174,6 +174,7 @@ def test_the_pose_of_the_page_is_the_documents() -> None:
     np.testing.assert_allclose(motion, np.eye(4), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("networks")  # without them the bowl stands, and turns about its foot
 def test_an_edit_by_http_gives_the_very_pixels_of_the_command_line(
     server: WebServer, tmp_path: Path

@@ -34,6 +34,7 @@ from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.scripting.animation import shrunk
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import photos, shapes
+from tests.tree import quick
 
 INK = np.array([0.1, 0.85, 0.2], np.float32)  # of which the made photo has nothing
 NEAR = 24  # levels, of a colour that is the ink's
@@ -262,13 +263,10 @@ def _inked(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 # px of the view: on the rim and the wall that comes into view below it; on the wall; its far edge;
 # the saucer behind; the spoon's end; the spoon's bowl
 @pytest.mark.usefixtures("networks")
-@pytest.mark.parametrize(
-    "way",
-    [
-        ((300, 30), (315, 70)), ((340, 120), (340, 190)), ((366, 150), (375, 170)),
-        ((440, 85), (459, 92)), ((320, 310), (350, 280)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("way", quick([
+    (((300, 30), (315, 70)),), (((440, 85), (459, 92)),), (((340, 120), (340, 190)),),
+    (((366, 150), (375, 170)),), (((320, 310), (350, 280)),),
+], 2))  # fmt: skip
 def test_of_a_side_that_came_into_view_only_what_lay_under_the_brush_is_coloured(way: tuple):
     document = _placed(Placement(turn=(50.0, 0.0, 0.0)), _cup())
     stroke = Stroke(document.photo.size, Brush(8.0, 1.0))

@@ -144,6 +144,7 @@ def test_the_bowl_in_the_sun():
     assert np.abs(result[lit].astype(float) - photo[lit]).mean() < 2
 
 
+@pytest.mark.slow
 def test_no_line_stays_where_the_bowls_shadow_ended():
     """Its edge is as wide and as sharpened as the camera made it."""
     photo, matte = _bowl(1)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+import pytest
 
 from objectmorpher_core.compose.shadow.shadow_fit import Surroundings, surroundings
 from objectmorpher_core.compose.shadow.shadow_look import SeenShadow, look_for_shadow, planes_of
@@ -45,6 +46,7 @@ def test_the_weights_are_those_that_were_measured():
     assert hashlib.sha256(registry.shadow_network()).hexdigest() in PAGE.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_things_with_a_shadow_have_higher_odds():
     """Most pairs of a scene with a shadow that one sees and one without are in order."""
     odds: dict[bool, list[float]] = {True: [], False: []}

@@ -66,6 +66,7 @@ def _seen(item: LiftedObject, motion: np.ndarray, camera: Camera = LENS_CAMERA) 
     return tiles.render(splats, object_texture(subject().matte, item), camera, LENS_CAMERA)
 
 
+@pytest.mark.slow
 def test_where_the_other_photo_was_taken():
     view = lifted()[2]
     turn = view.pose[:3, :3] / np.cbrt(np.linalg.det(view.pose[:3, :3]))

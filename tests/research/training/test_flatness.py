@@ -53,6 +53,7 @@ def shipped() -> ShapeModel:
     return ShapeModel(registry.shape_network())
 
 
+@pytest.mark.slow
 def test_flat_things_are_seen_to_be_flat_and_round_ones_are_not(networks, shipped):
     """Of 12 prints and 12 round things that no network was trained on."""
 

@@ -75,6 +75,7 @@ def test_samples_show_a_handle_of_a_vessel():
         )
 
 
+@pytest.mark.slow
 def test_it_learns_and_runs_without_torch(tmp_path):
     """Azimuths that are plain in the tokens are found in tokens that were not learned from."""
     rng = np.random.default_rng(0)
