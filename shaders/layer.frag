@@ -64,7 +64,7 @@ void main() {
     vec3 below = texelFetch(under, ivec2(gl_FragCoord.xy), 0).rgb;
     color = vec4(mixed(below, color, MODE), 1.0);
 #endif
-#ifdef HAS_BLEND  // what shows the photo shows it through the layer, too, not what lies between
+#ifdef HAS_BLEND  // where the photo is shown, the layer shows it too, and not what lies between
     vec3 original = texture(photo, (corner + xy / zoom) / photo_size).rgb;
     color.rgb = mix(color.a * original, color.rgb, texture(blend, xy / cells).r);
 #endif

@@ -100,7 +100,7 @@ def _places(data: bytes) -> dict[int, F64]:
             for thing in told["objects"]
         }
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ScriptError("the file is none of handles as --save-handles writes them") from error
+        raise ScriptError("this is not a file of handles such as --save-handles writes") from error
     if not all(np.isfinite(places).all() for places in found.values()):
         raise ScriptError("a place of a handle is not finite")
     return found

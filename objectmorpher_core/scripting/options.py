@@ -450,7 +450,7 @@ def script_from(options: Mapping[str, Any], dashes: str = "") -> EditScript:
         name = key.replace("-", "_")
         if name in WRITTEN or name.startswith("save_"):
             raise ScriptError(
-                f"{shown(key)} says what is to be written: it stands on the command line, not here"
+                f"{shown(key)} is no option of an edit: it belongs on the command line"
             )
         if name not in OPTIONS:
             raise ScriptError(f"there is no option {shown(key)}{meant(name, OPTIONS)}")

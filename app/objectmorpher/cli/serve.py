@@ -80,7 +80,7 @@ def run_serve(options: argparse.Namespace) -> None:
     plan = ClusterPlan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
     show_log()
     limits = RequestLimits(body=options.max_body << 20)
-    with _named(options):
+    with _naming_address(options):
         front = _front(options, stages, token, limits, plan)
     with _served(front):  # Ray sets handlers of signals when it starts, and has done so
         _greet(front.url, token if is_new else None, options)
@@ -105,8 +105,8 @@ def _front(
 
 
 @contextmanager
-def _named(options: argparse.Namespace) -> Iterator[None]:
-    """Say where nobody can listen, too."""
+def _naming_address(options: argparse.Namespace) -> Iterator[None]:
+    """Say which address it is that nobody can listen on."""
     try:
         yield
     except OSError as error:
@@ -123,7 +123,7 @@ def _run_web(options: argparse.Namespace) -> None:
     _check_address(options)
     token, is_new = _token(options.token_file)
     show_log()
-    with _named(options):
+    with _naming_address(options):
         server = WebServer((options.host, options.port), token, options.max_body << 20)
     server.start()
     with _served(server):

@@ -60,7 +60,7 @@ def rehearse() -> None:
 def _add(
     layer: CanvasLayer, photo: np.ndarray, blend: F32, photo_box: Bounds, out: np.ndarray
 ) -> None:
-    """Draws a layer over what is there; as much as it is covered by the `photo`."""
+    """Draws a layer over what is there; where the `photo` is shown, it shows that, too."""
     low = [max(a, b, 0.0) for a, b in zip(layer.box[:2], photo_box[:2], strict=True)]
     size = out.shape[1], out.shape[0]
     high = [min(a, b, c) for a, b, c in zip(layer.box[2:], photo_box[2:], size, strict=True)]
@@ -190,7 +190,7 @@ def _add_coarse(
 def _covered(p, colour, gain, share, photo):
     """The pixel `p` under a premultiplied colour in its light (light.glsl, layer.frag).
 
-    But for its `share` the colour is that of the photo's pixel: it does not show what lies between.
+    Only a `share` of it has that colour, the rest the photo's: what lies between is not seen.
     """
     r, g, b, a = colour
     r, g, b = min(r * gain[0], a), min(g * gain[1], a), min(b * gain[2], a)

@@ -235,9 +235,9 @@ def plate_of_holes(
 def shaded_plate(
     document: Document, holes: tuple[Matte, ...], ghosts: tuple[Ghost, ...]
 ) -> Plate | None:
-    """The plate without ghosts, with the shade that goes on behind things that only turned.
+    """The plate without the ghosts that go, and in the shade that lies behind what only turned.
 
-    It stays the same for a whole drag, however far that has come.
+    It is the same for a whole drag, however far the object has come.
     """
     plate, still = document.plate, shaded(document, holes)
     if plate is None:

@@ -277,7 +277,7 @@ def shown_shares(
     for ghost in ghosts:
         item, camera = document.objects[ghost.owner], document.photo.camera
         px = 0.0
-        if has_left(item, holes):
+        if _has_left(item, holes):
             stays = _stays(ghost, document)
             px = _moved_by(replace(item, placement=Placement()) if stays else item, camera, ghost)
         share = np.clip((px - MOVED[0]) / (MOVED[1] - MOVED[0]), 0, 1)
@@ -285,7 +285,7 @@ def shown_shares(
     return tuple(shares)
 
 
-def has_left(item: EditObject, holes: Sequence[Matte]) -> bool:
+def _has_left(item: EditObject, holes: Sequence[Matte]) -> bool:
     """Whether an object is no more where it was in the photo; `holes` as above."""
     return any(item.matte is hole for hole in holes)
 
@@ -295,7 +295,7 @@ def without_ghosts(
 ) -> Plate:
     """The plate without the ghosts that go with what has left, however far that is by now."""
     photo, objects = document.photo.pixels, document.objects
-    goes = [has_left(objects[g.owner], holes) and not _stays(g, document) for g in ghosts]
+    goes = [_has_left(objects[g.owner], holes) and not _stays(g, document) for g in ghosts]
     return with_ghosts(plate, photo, ghosts, [float(each) for each in goes])
 
 

@@ -184,7 +184,9 @@ def draw_recovery(editor: Editor, width: float) -> None:
         _draw_left(editor, left, width)
     if rest := len(editor.recovery.left) - len(shown):
         with small_text():
-            imgui.text_colored(theme.vec("secondary"), t("{count} more after these", count=rest))
+            imgui.text_colored(
+                theme.vec("secondary"), t("{count} more are not shown yet", count=rest)
+            )
     if shown:
         imgui.dummy(theme.size(0, GAP - 8))
 

@@ -467,10 +467,8 @@ class WindowSize:
         io.display_framebuffer_scale = ImVec2(self.ratio, self.pixels[1] / max(self.size[1], 1))
         io.delta_time = max(now - self._time, LEAST_STEP)
         self._time = now
-        if not self._is_pointer_inside and any(
-            glfw.get_mouse_button(self._handle, button) for button in BUTTONS
-        ):  # to ImGui it is nowhere, but a stroke goes on there
-            io.add_mouse_pos_event(*glfw.get_cursor_pos(self._handle))
+        if not self._is_pointer_inside and (held := self.held_pointer()) is not None:
+            io.add_mouse_pos_event(*held)  # to ImGui it is nowhere, but a stroke goes on there
 
     def held_pointer(self) -> tuple[float, float] | None:
         """Where the pointer is now, window units; None where no button holds it any more.
