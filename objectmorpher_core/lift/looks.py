@@ -21,7 +21,7 @@ class Looks(Generic[Answer]):
         self._answers: OrderedDict[bytes, Answer] = OrderedDict()
 
     def get(self, look: Callable[[], Answer], *seen: np.ndarray, about: str = "") -> Answer:
-        """The answer to what is `seen`, about which also `about` is known; a new one by `look`."""
+        """Return the answer to what is `seen` and to `about`; `look` gives one that is new."""
         known = hashlib.sha256(f"{about} {[part.shape for part in seen]}".encode())
         for part in seen:
             known.update(np.ascontiguousarray(part).data)
