@@ -155,6 +155,7 @@ def spread(
     density = OVERSAMPLING / spacing**2  # candidates per px^2
     chains = [_chain(body, lines + ends, FRONT, spacing), _chain(body, lines, BACK, spacing)]
     if solid is not None:
+        chains[0] = chains[0][~_is_grazed(solid, outline, chains[0])]
         chains[0] = np.vstack([chains[0], _seen_edges(solid, lines, outline, spacing)])
         chains[1] = chains[1][~_is_own(solid, outline, chains[1])]
     drawn = []
@@ -164,7 +165,7 @@ def spread(
     around = [(_brim(body, band, spacing, density, rng), 0)]
     around += _inner(body, spacing, density, rng)
     # Most candidates of the sheets are dropped: their normals are found when that is done.
-    clouds = [(xy, body.height(xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
+    clouds = [(xy, _heights(body, xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
     clouds += [(surface.xy, surface.height) for surface, _ in around]
     first = [len(chain) for chain in chains] + [count for _, count in around]
     front, back, *others = _thinned(clouds, first, spacing, rng)
@@ -234,6 +235,11 @@ def _withdrawn(body: ReliefBody, xy: F64, side: float, lines: list[RimLine], spa
     _, gradient = body.sample(xy[beside], side)
     seen = depth / np.sqrt(1 + (gradient**2).sum(1))
     is_within[beside] = _is_within(xy[beside], lines, outline, np.maximum(seen, BARELY * spacing))
+    if body.solid is not None and side == FRONT:  # nor beyond the rows along its edges
+        own = np.flatnonzero(is_within & _is_own(body.solid, outline, xy))
+        height, face, is_met = body.solid.met(xy[own])
+        inset = body.solid.inset(body.solid.places(xy[own], height), face)
+        is_within[own[is_met & (inset < INSET * spacing)]] = False
     return xy[is_within]
 
 
@@ -261,7 +267,28 @@ def _sheet(body: ReliefBody, xy: F64, side: float) -> SurfacePoints:
     normals = side * np.column_stack([-gradient, np.ones(len(xy))])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     is_front = np.full(len(xy), side == FRONT)
+    if body.solid is not None and side == FRONT:
+        own = _is_own(body.solid, body.silhouette, xy)
+        height[own], face, is_met = body.solid.met(xy[own])
+        met = np.flatnonzero(own)[is_met]
+        places = body.solid.places(xy[met], height[met])
+        normals[met] = body.solid.relief_normals(places, body.solid.normals[face[is_met]])
     return SurfacePoints(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
+
+
+def _heights(body: ReliefBody, xy: F64, side: float) -> F64:
+    """(N,) px of a sheet at photo px (N, 2)."""
+    height = body.height(xy, side)
+    if body.solid is not None and side == FRONT:
+        own = _is_own(body.solid, body.silhouette, xy)
+        height[own], _, _ = body.solid.met(xy[own])
+    return height
+
+
+def _is_grazed(solid: PlainSolid, outline: ReliefSilhouette, xy: F64) -> Mask:
+    """Which photo px (N, 2) show a face of which the photo shows a sliver."""
+    _, face, _ = solid.met(xy)
+    return solid.is_grazing[face] & _is_own(solid, outline, xy)
 
 
 def _own(surface: SurfacePoints, body: ReliefBody, spacing: float) -> SurfacePoints:
@@ -343,7 +370,8 @@ def _on_solid(
     kept = np.flatnonzero(_is_own(solid, outline, xy))
     leading = int(np.count_nonzero(kept < first))
     order = np.r_[np.arange(leading), leading + rng.permutation(len(kept) - leading)]
-    kept = kept[thin_to_spacing(places[kept], spacing * np.sqrt(PACKING), order)]
+    points = np.column_stack([xy, height])[kept]
+    kept = kept[thin_to_spacing(points, spacing * np.sqrt(PACKING), order)]
     normals, no = solid.relief_normals(places[kept], normals[kept]), np.zeros(len(kept), bool)
     return SurfacePoints(xy[kept], height[kept], normals, no, no, no, xy[kept])
 
@@ -499,6 +527,9 @@ def _brim(
         ring &= np.abs(np.subtract(*_away_from_parts(body, pad))) > spacing
     xy = _draw(outline, np.where(ring, density * outline.cell**2, 0.0), rng) - pad * outline.cell
     height, _ = body.sample(xy, MIDDLE)
+    if body.solid is not None:
+        own = _is_own(body.solid, outline, xy)
+        height[own] = body.solid.beside(xy[own])
     normals = np.column_stack([outline.outward(xy), np.zeros(len(xy))])
     yes = np.ones(len(xy), bool)
     return SurfacePoints(xy, height, normals, yes, yes, yes, xy)

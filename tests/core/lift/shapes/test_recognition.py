@@ -18,7 +18,7 @@ from objectmorpher_core.lift.crop import SIDE, Crop, rays
 from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.lifter import _world_normals
-from objectmorpher_core.lift.relief.plain_solid import PlainSolid
+from objectmorpher_core.lift.relief.plain_solid import IN_LINE, INSET, PlainSolid
 from objectmorpher_core.lift.relief.shape_look import SeenShape
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.spreading import spread
@@ -305,6 +305,52 @@ def test_the_hidden_sides_of_a_box_lie_on_it_and_have_no_gaps(turn) -> None:
     whole = replace(body, solid=None)
     assert abs(len(surface.xy) / len(spread(whole, 3000, 2.0, rng)[0].xy) - 1) < 0.15
     assert body.nearer(np.zeros(body.silhouette.shape)).solid is None, "what is moved is no box"
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_rows_beside_a_box_s_edges_are_straight_and_nothing_sticks_out_of_them(turn) -> None:
+    mesh = box(AT, turn_matrix(*turn).T, np.array([0.22, 0.3, 0.15]))
+    seen, _ = see(mesh)
+    body, camera = body_of(seen)
+    found = recognised(seen)
+    assert found is not None
+    body = completed(fused(body, seen, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
+    solid = body.solid
+    assert solid is not None
+    surface, spacing = spread(body, 3000, 2.0, np.random.default_rng(0))
+    points = np.column_stack([surface.xy, surface.height])[surface.is_seen & ~surface.is_brim]
+    places = camera.unproject(points[:, :2], camera.focal - points[:, 2])
+    normals = solid.normals
+    beyond = places @ normals.T - (normals * solid.vertices[solid.faces[:, 0]]).sum(1)
+    shown, looked_at = solid.is_seen & ~solid.is_hidden, 0
+    for (a, b), (one, other) in _edges(solid):
+        if not (shown[one] and shown[other]):
+            continue
+        way, length = (b - a) / np.linalg.norm(b - a), float(np.linalg.norm(b - a))
+        along = (places - a) @ way
+        away = np.linalg.norm(places - a - along[:, None] * way, axis=1)
+        for face in (one, other):
+            own = (np.abs(beyond[:, face]) < 0.01 * spacing) & (along > spacing)
+            own &= along < length - spacing
+            if not own.any():
+                continue  # it is a sliver
+            assert away[own].min() > 0.99 * INSET * spacing
+            row = own & (away < 1.01 * INSET * spacing)
+            gaps = np.linalg.norm(np.diff(points[row][np.argsort(along[row])], axis=0), axis=1)
+            assert gaps.max() < 1.2 * IN_LINE * spacing
+            looked_at += 1
+    assert looked_at >= 2
+
+
+def _edges(solid: PlainSolid) -> list[tuple[np.ndarray, tuple[int, int]]]:
+    """The ends (2, 3) of each edge between two sides, and a face of each."""
+    found = []
+    for one, corners in enumerate(solid.faces):
+        for other in range(one):
+            both = np.intersect1d(corners, solid.faces[other])
+            if len(both) == 2 and abs(solid.normals[one] @ solid.normals[other]) < 0.1:
+                found.append((solid.vertices[both], (one, other)))
+    return found
 
 
 def test_normals_of_a_solid_are_turned_into_relief_coordinates_and_back() -> None:
