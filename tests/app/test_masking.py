@@ -18,6 +18,7 @@ from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.tasks import READY, Combine, Question
 from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
+from objectmorpher.render.renderer import same_scene
 from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher.tools.pointer import Button
 from objectmorpher.tools.registry import Tool
@@ -95,7 +96,10 @@ def test_the_stroke_is_seen_while_it_is_painted_and_esc_takes_it_back(editor: Ed
     press(editor, MaskTool(), at)
     assert editor.masking.shown is not None
     assert editor.masking.shown[20, 20] == 255
+    scene = build_scene(editor, "gl")
+    assert same_scene(scene, build_scene(editor, "gl")), "what stays is not drawn again"
     move(editor, at + 80)
+    assert not same_scene(scene, build_scene(editor, "gl")), "the mask is painted in place"
     assert editor.masking.painting is not None
     assert len(editor.masking.painting.touched) == 2
     editor.escape()

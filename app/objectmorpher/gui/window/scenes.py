@@ -94,7 +94,7 @@ def _selecting(editor: Editor, document: Document) -> Scene:
     return Scene(
         document.photo.pixels, theme.rgb("surround"), layers=() if tint is None else (tint,),
         mask=selection,
-        touched=painting.touched if painting else (), veil=strength if is_veiled else 0.0,
+        touched=tuple(painting.touched) if painting else (), veil=strength if is_veiled else 0.0,
     )  # fmt: skip
 
 
