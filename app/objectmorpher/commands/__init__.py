@@ -85,12 +85,16 @@ def keys_of(editor: Editor, name: str) -> str:
 def take_next_step(editor: Editor) -> None:
     """Carry out the primary button's step; where it asks for a click, click at the pointer.
 
+    While something is being selected, that is lifted as soon as it is there.
+
     Also before the candidate is marked: a slow machine, or a worker that ended, marks none.
     """
     name = next_step(editor)[1]
     if editor.hand.is_busy:
         return
-    if name is not None:
+    if editor.tasks.question is not None and name in (None, "lift"):
+        editor.tasks.lift_when_selected()
+    elif name is not None:
         run(editor, name)
     elif editor.tasks.is_click_awaited and editor.hover.place is not None:
         editor.selection.add_click(*editor.hover.place, is_foreground=True)
