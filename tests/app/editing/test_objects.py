@@ -59,7 +59,7 @@ def test_the_view_of_a_moved_copy_keeps_the_object(copied: Editor) -> None:
     document, view = copied.document, copied.view
     assert document is not None
     assert drawn_order(document, Shown.COMPOSITE, partial(copied.derived.posed, document)) == [0, 1]
-    assert not copied.derived.moved_mask(document).any()
+    assert copied.derived.unfilled(edits.set_plate(document, None)) is None
     plate = copied.derived.plate(document)
     assert plate is not None and not plate.hole.any()
     blend = build_frame(document, view, copied.cache).blend
