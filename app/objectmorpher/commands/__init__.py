@@ -27,7 +27,7 @@ SETTINGS: dict[str, tuple[str, ...]] = {
         "X", "Y", "Depth", "Pin: it holds still", "Turns with the object",
     ),
     "place": (
-        "Move over the ground", "Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "From above",
+        "Move along the ground", "Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "From above",
         "Scale",
     ),
     "look": (
@@ -37,7 +37,7 @@ SETTINGS: dict[str, tuple[str, ...]] = {
     "compose": (
         "Show it alone", "Opacity", "Exposure", "Warmth", "Saturation", "Sharpness", "Blur",
         "Blend mode", "Shadow", "Strength", "Length", "Softness", "Contact", "Ground", "Falls to",
-        "Falls on walls and steps", "Light", "Grain", "Focus", "Blend", "Network", "Amount",
+        "Falls on walls and steps", "Light", "Grain", "Focus", "Blend", "AI refinement", "Amount",
     ),
 }  # fmt: skip
 
