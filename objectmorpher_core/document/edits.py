@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +39,7 @@ from .settings import (
 )
 
 SAME_THING = 0.15  # IoU of two masks, below which they are of two things
+COPY = re.compile(r" copy( \d+)?$")  # at the end of a copy's name
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
 
 
@@ -415,7 +417,8 @@ def duplicate(document: Document, k: int) -> Document:
     item = document.objects[k]
     if item.lifted is None:
         raise EditError("lift the object before making a copy of it")
-    copy = replace(item, name=free_name(item.name, {o.name for o in document.objects}))
+    name, taken = f"{COPY.sub('', item.name)} copy", {o.name for o in document.objects}
+    copy = replace(item, name=free_name(name, taken) if name in taken else name)
     return replace(document, objects=(*document.objects, copy), refined=None)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from functools import cache
 from threading import Lock
@@ -24,6 +26,7 @@ TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the clas
 INNER = tuple(f"/backbone/encoder/layer.{k}/Add_1_output_0" for k in (5, 8))
 PATCH = 14  # px
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
+USUAL_TIME = 4.0  # s of a run on two cores
 KEPT = 4  # of the last photos' tokens; each takes 3 MB
 SMALLEST_PATCH = 4  # px of the photo; finer ones would only see the enlargement's blur
 
@@ -54,16 +57,24 @@ class TokenNet:
     def _run(self, rgb: RGB, progress: Progress, *outputs: str) -> list[F32]:
         height, width = (n // PATCH for n in rgb.shape[:2])
         pixels = ((rgb.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
-        watched = lambda: progress(0.5, "recognising its parts")  # noqa: E731
-        found = run_session(self._session, list(outputs), {IMAGES: pixels}, watched)
+        inputs = {IMAGES: pixels}
+        found = run_session(self._session, list(outputs), inputs, _watching(progress))
         return [np.asarray(f[0, 1:].reshape(height, width, -1), np.float32) for f in found]
+
+
+def _watching(progress: Progress) -> Callable[[], None]:
+    """To be called again and again while the network runs: it goes on, ever slower."""
+    began = time.monotonic()
+    return lambda: progress(
+        1 - math.exp((began - time.monotonic()) / USUAL_TIME), "recognising its parts"
+    )
 
 
 def photo_tokens(rgb: RGB, patches: int, progress: Progress = silent) -> F32:
     """(h, w, 384) of about so many patches of a photo (H, W, 3)."""
     small = _reduced(rgb, patches)
-    watch = lambda: progress(0.5, "recognising its parts")  # noqa: E731
-    return _early.answer(small, lambda: shared().tokens(small, progress), watch)
+    compute = lambda: shared().tokens(small, progress)  # noqa: E731
+    return _early.answer(small, compute, _watching(progress))
 
 
 def expect_tokens(rgb: RGB) -> Callable[[], None]:

@@ -130,14 +130,17 @@ def test_a_pointer_that_leaves_leaves_no_candidate(editor: Editor) -> None:
 
 
 def test_enter_is_a_click_also_where_no_candidate_comes(editor: Editor) -> None:
-    """Of a slow machine, or while none is there yet; a second Enter does not ask for a part."""
+    """Of a slow machine, or while none is there yet; a second Enter lifts what comes."""
     wait_for_jobs(editor)
     rest_on(editor, *CENTRE)
     editor.candidates.shown = None
     take_next_step(editor)
+    assert editor.message is None and not editor.is_lifted
     take_next_step(editor)
+    assert editor.message is not None, "that it will be lifted"
     wait_for_jobs(editor)
     assert editor.object is not None and editor.object.mask is not None
+    assert editor.is_lifted
     prompt = editor.object.prompt
     assert [(c.x, c.y) for c in prompt.clicks] == [CENTRE]
     assert prompt.level == editor.view.selecting.level

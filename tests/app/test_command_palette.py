@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from hands import opened
-from objectmorpher.commands import COMMANDS, SETTINGS
+from objectmorpher.commands import COMMANDS, OTHER_WORDS, SETTINGS
 from objectmorpher.editor.editor import Editor
 from objectmorpher.gui.dialogs.popups.palette import CommandPalette
 from objectmorpher.system.help_pages import FIRST, ORDER, Kind, blocks_of, pages
+from objectmorpher.system.texts import languages
 
 ROOT = Path(__file__).parents[2]
 PANELS = ROOT / "app" / "objectmorpher" / "gui"
@@ -56,6 +57,12 @@ def test_it_names_every_number_and_every_tick_of_the_panels() -> None:
     assert set(labels) - known == set()
 
 
+def test_other_words_are_of_things_that_there_are() -> None:
+    known = {label for labels in SETTINGS.values() for label in labels}
+    known |= {command.label for command in COMMANDS.values()}
+    assert set(OTHER_WORDS) <= known
+
+
 def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Editor) -> None:
     palette = CommandPalette()
 
@@ -69,6 +76,17 @@ def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Ed
     assert first("opac") == ("Opacity", "compose")
     assert first("bend a") == ("Bend a part and keep the rest", "")
     assert first("stays pin")[0] == "Pin that stays"
+    for typed, title in (
+        ("rotate", "Place"), ("resize", "Scale"), ("jpeg", "Export photo…"),
+        ("transparency", "Opacity"), ("100%", "Actual size"), ("dark mode", "Theme"),
+        ("heal", "Background alone"), ("drop shadow", "Shadow"), ("deselect", "Clear selection"),
+        ("hotkeys", "Keyboard and pointer…"), ("hue", "Saturation"), ("flip", "Symmetry"),
+    ):  # fmt: skip
+        palette._typed = typed
+        assert title in [entry.title for entry in palette._found(editor)][:3], typed
+    palette._typed = "language"
+    is_there = "Language" in [entry.title for entry in palette._found(editor)]
+    assert is_there is (len(languages()) > 1), "as in Preferences"
     palette._typed = ""
     everything = {entry.command for entry in palette._found(editor)}
     assert everything >= set(COMMANDS) - {"palette"}
@@ -90,6 +108,13 @@ def test_a_command_is_found_and_run_by_typing(
         hands.area("Panel")
         hands.press("Return")
         hands.wait(lambda: "Select subject" not in hands.places(), "folding the panel up")
+        hands.press("ctrl+k")
+        hands.area(SEARCH)
+        hands.settle()
+        hands.xdotool("type", "--delay", 30, "select by")
+        hands.press("Return")
+        framed, row = hands.area("Sought"), hands.area("Box")
+        assert framed[1] < row[1] and "Select subject" in hands.places(), "the panel is back"
         hands.press("ctrl+k")
         hands.area(SEARCH)
         hands.settle()

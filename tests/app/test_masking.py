@@ -18,6 +18,7 @@ from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.tasks import READY, Combine, Question
 from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
+from objectmorpher.render.renderer import same_scene
 from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher.tools.pointer import Button
 from objectmorpher.tools.registry import Tool
@@ -95,7 +96,10 @@ def test_the_stroke_is_seen_while_it_is_painted_and_esc_takes_it_back(editor: Ed
     press(editor, MaskTool(), at)
     assert editor.masking.shown is not None
     assert editor.masking.shown[20, 20] == 255
+    scene = build_scene(editor, "gl")
+    assert same_scene(scene, build_scene(editor, "gl")), "what stays is not drawn again"
     move(editor, at + 80)
+    assert not same_scene(scene, build_scene(editor, "gl")), "the mask is painted in place"
     assert editor.masking.painting is not None
     assert len(editor.masking.painting.touched) == 2
     editor.escape()
@@ -321,6 +325,23 @@ def test_the_edited_picture_stays_whatever_tool_and_object(editor: Editor, ball:
         assert (_picture(editor) == wanted) != is_photo
     editor.view.is_before = False
     assert {(ToolName.SELECT, False), (ToolName.MASK, True), (ToolName.POSE, True)} <= shown
+
+
+def test_the_background_stays_until_that_of_one_object_more_is_made(
+    editor: Editor, ball: Document
+) -> None:
+    _moved_ball(editor, ball, 40.0, 5.0)
+    before = build_scene(editor, "tiles")
+    assert before is not None and before.plate is not None
+    editor.objects.start_another()
+    editor.selection.set_outline(np.array([[2, 2], [22, 2], [22, 22], [2, 22]], float))
+    assert editor.document is not None and editor.document.plate is None
+    scene = build_scene(editor, "tiles")
+    assert scene is not None and scene.plate is not None and scene.mask is None
+    np.testing.assert_array_equal(scene.plate.pixels, before.plate.pixels)
+    wait_for_jobs(editor)
+    assert editor.document.plate is not None
+    assert build_scene(editor, "tiles").plate is not scene.plate
 
 
 def _picture(editor: Editor) -> tuple:

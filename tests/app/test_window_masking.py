@@ -27,15 +27,20 @@ def test_a_stroke_by_hand_makes_the_selection_larger(
     with opened(window_environment, photo_path) as hands:
         hands.area("Photo")
         hands.settle()  # the title says the photo's name before it is drawn
-        before = brightness(hands, 30.5, 18.5)
+        before, far = brightness(hands, 30.5, 18.5), brightness(hands, 70.5, 18.5)
         hands.click(*screen_xy(*CENTRE))
         hands.wait(lambda: hands.is_accent(PRIMARY), "selecting")
         hands.wait(lambda: brightness(hands, 30.5, 18.5) < 0.8 * before, "veiling")
         if segment.load("dino").missing() is None:
             hands.wait(lambda: any("% sure" in text for text in hands.places()), "telling")
         hands.press("2")
-        hands.drag(screen_xy(20, 18), screen_xy(60, 18))
-        hands.wait(lambda: brightness(hands, 30.5, 18.5) > 0.95 * before, "painting")
+        hands.xdotool("mousemove", *map(round, screen_xy(20, 18)))
+        hands.xdotool("mousedown", 1)
+        hands.wait(lambda: brightness(hands, 30.5, 18.5) > 0.95 * before, "putting it down")
+        for x in (40, 55, 70):
+            hands.xdotool("mousemove", *map(round, screen_xy(x, 18)))
+        hands.wait(lambda: brightness(hands, 70.5, 18.5) > 0.95 * far, "painting")
+        hands.xdotool("mouseup", 1)
         hands.press("ctrl+z")
         hands.wait(lambda: brightness(hands, 30.5, 18.5) < 0.7 * before, "undoing")
 

@@ -174,7 +174,7 @@ def test_progress_says_all_that_is_done_in_order() -> None:
     asked(run_script(PHOTO, "", wanted, MASK_PNG).document, wanted).run(
         lambda fraction, text: alone.append((fraction, text))
     )
-    first = [text for _, text in steps].index("Filling the background")
+    first = [text for _, text in steps].index("Filling in the background")
     assert first > [text for _, text in steps].index("Filling in its sides")
     said = [text for (_, text), _ in groupby(steps[first:])]
     assert said[: len(list(groupby(alone)))] == [text for (_, text), _ in groupby(alone)]

@@ -84,25 +84,35 @@ class Derived:
         self._links, self._bodies = Memo(), Memo()
         self._plates, self._shaded = Memo(), Memo()
         self._carriers, self._invented, self._hidden = Memo(), Memo(), Memo()
-        self._ghosts = Memo()
+        self._ghosts, self._standing = Memo(), Memo()
+        # The last background that was shown, and for which masks it was made
+        self._filled: tuple[tuple[Mask, ...], Plate] | None = None
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
         return self._shares(lambda: float(mask.mean()), mask)
 
-    def moved_mask(self, document: Document) -> Mask:
-        """Return the mask of the places that moved objects have left empty in the photo."""
-        from objectmorpher_core.compose.order import leaves_a_hole
+    def with_background(self, document: Document) -> Document:
+        """Return the document; while its background is made anew, with the one it had before."""
+        if document.plate is not None:
+            masks = tuple(o.mask for o in document.objects if o.mask is not None)
+            self._filled = masks, document.plate
+        elif self._filled is not None and len(_left(document)) > len(self._unfilled(document)):
+            plate = self._filled[1]
+            return self._standing(lambda: replace(document, plate=plate), document, plate)
+        return document
 
-        objects = document.objects
-        there = [k for k, o in enumerate(objects) if o.is_moved and leaves_a_hole(objects, k)]
-        masks = [mask for k in there if (mask := objects[k].mask) is not None]
+    def unfilled(self, document: Document) -> Mask | None:
+        """(H, W) what moved objects have left where `with_background` has nothing for it."""
+        masks = self._unfilled(document)
+        if document.plate is not None or not masks:
+            return None
+        return self._holes(lambda: np.logical_or.reduce(masks), *masks)
 
-        def build() -> Mask:
-            nothing = np.zeros(document.photo.size[::-1], bool)
-            return np.logical_or.reduce([nothing, *masks])
-
-        return self._holes(build, document.photo, *masks)
+    def _unfilled(self, document: Document) -> list[Mask]:
+        """The masks of what moved that the last background was not made for."""
+        filled = () if self._filled is None else self._filled[0]
+        return [mask for mask in _left(document) if all(mask is not one for one in filled)]
 
     def plate(self, document: Document) -> Plate | None:
         """Return the background of the view: the photo around the objects that are still there."""
@@ -342,6 +352,15 @@ class Derived:
         return shape.puppet.pick_in(
             drawable, shape.texture, at, thing.pose, thing.placement, reach
         )  # fmt: skip
+
+
+def _left(document: Document) -> list[Mask]:
+    """The masks of the objects that have moved away from where they were in the photo."""
+    from objectmorpher_core.compose.order import leaves_a_hole
+
+    objects = document.objects
+    there = [o for k, o in enumerate(objects) if o.is_moved and leaves_a_hole(objects, k)]
+    return [o.mask for o in there if o.mask is not None]
 
 
 def _parts_of(thing: EditObject) -> tuple[object, ...]:

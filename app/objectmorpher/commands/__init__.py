@@ -27,7 +27,7 @@ SETTINGS: dict[str, tuple[str, ...]] = {
         "X", "Y", "Depth", "Pin: it holds still", "Turns with the object",
     ),
     "place": (
-        "Move over the ground", "Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "From above",
+        "Move along the ground", "Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "From above",
         "Scale",
     ),
     "look": (
@@ -37,13 +37,79 @@ SETTINGS: dict[str, tuple[str, ...]] = {
     "compose": (
         "Show it alone", "Opacity", "Exposure", "Warmth", "Saturation", "Sharpness", "Blur",
         "Blend mode", "Shadow", "Strength", "Length", "Softness", "Contact", "Ground", "Falls to",
-        "Falls on walls and steps", "Light", "Grain", "Focus", "Blend", "Network", "Amount",
+        "Falls on walls and steps", "Light", "Grain", "Focus", "Blend", "AI refinement", "Amount",
     ),
 }  # fmt: skip
 
+# What other programs and people call them: the palette finds those words, too, in English.
+
+OTHER_WORDS = {
+    "Actual size": "100% 1:1",
+    "Background alone": "heal repair retouch clean plate spot",
+    "Blend": "feather edge anti-alias",
+    "Blend mode": "multiply screen overlay",
+    "Blur": "soften gaussian",
+    "Bring forward": "layers arrange order raise above",
+    "Brush": "size",
+    "Clear selection": "deselect select none",
+    "Contact": "ambient occlusion",
+    "Double size": "200%",
+    "Duplicate object": "clone copy",
+    "Edge brush": "hair fur refine matting",
+    "Exposure": "brightness lightness light levels",
+    "Export photo…": "save jpeg jpg png tiff webp psd transparency alpha layers gif video render",
+    "Fill from a spot": "clone stamp patch source",
+    "Fill in again": "inpaint content-aware generative heal",
+    "Focus": "depth of field bokeh defocus",
+    "Grain": "noise",
+    "Grow": "expand dilate",
+    "Invert selection": "inverse",
+    "Keyboard and pointer…": "hotkeys shortcuts keymap keys",
+    "Language": "translation locale",
+    "Lift object": "3d extract model cut out",
+    "Light": "relight harmonise match",
+    "Lock object": "freeze protect",
+    "Long jobs": "server remote gpu cloud",
+    "Motion": "animation reduced",
+    "Opacity": "transparency alpha transparent",
+    "Paint on the object": "clone stamp draw",
+    "Panel": "sidebar inspector dock",
+    "Pitch": "rotate tilt",
+    "Pose": "bend deform warp puppet liquify",
+    "Place": "move transform rotate resize scale",
+    "Preferences…": "settings options configuration",
+    "Proof colours": "cmyk print gamut",
+    "Redo": "repeat",
+    "Refine": "ai harmonize enhance",
+    "Refine mask": "brush paint selection",
+    "Remove object": "delete erase",
+    "Reset pose": "revert original",
+    "Roll": "rotate spin",
+    "Rotation ring": "rotate turn",
+    "Saturation": "hue colour color vibrance",
+    "Save session": "project",
+    "Scale": "resize size larger smaller",
+    "Screen colours": "icc profile color management monitor",
+    "Select": "magic wand quick selection",
+    "Select by": "lasso marquee box",
+    "Select subject": "remove background auto",
+    "Send backward": "layers arrange order lower below",
+    "Shadow": "drop shadow",
+    "Shrink": "contract erode",
+    "Split before/after": "compare",
+    "Strength": "drop shadow",
+    "Symmetry": "mirror flip",
+    "Text size": "font zoom interface scale dpi",
+    "Theme": "dark mode light mode colours appearance",
+    "Undo": "back revert",
+    "Tutorial and how-to…": "help manual documentation",
+    "Warmth": "temperature white balance hue tint colour color",
+    "Yaw": "rotate turn",
+}  # fmt: skip
 
 __all__ = [
-    "COMMANDS", "GROUPS", "Command", "keys_of", "next_step", "run", "take_next_step", "why_not",
+    "COMMANDS", "GROUPS", "OTHER_WORDS", "Command", "keys_of", "next_step", "run",
+    "take_next_step", "why_not",
 ]  # fmt: skip
 
 GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
@@ -85,12 +151,16 @@ def keys_of(editor: Editor, name: str) -> str:
 def take_next_step(editor: Editor) -> None:
     """Carry out the primary button's step; where it asks for a click, click at the pointer.
 
+    While something is being selected, that is lifted as soon as it is there.
+
     Also before the candidate is marked: a slow machine, or a worker that ended, marks none.
     """
     name = next_step(editor)[1]
     if editor.hand.is_busy:
         return
-    if name is not None:
+    if editor.tasks.question is not None and name in (None, "lift"):
+        editor.tasks.lift_when_selected()
+    elif name is not None:
         run(editor, name)
     elif editor.tasks.is_click_awaited and editor.hover.place is not None:
         editor.selection.add_click(*editor.hover.place, is_foreground=True)

@@ -122,7 +122,7 @@ PLACE_COMMANDS: dict[str, Command] = {
         "Reset size", "", lambda e: e.placing.reset_size(), _not_sized
     ),
     "ground": Command(
-        "Move over the ground", "G", lambda e: e.placing.toggle_ground(), no_lift,
+        "Move along the ground", "G", lambda e: e.placing.toggle_ground(), no_lift,
         lambda e: e.placing.is_grounded,
     ),
 }  # fmt: skip

@@ -203,7 +203,7 @@ class Editor(EditorState):
         if self.hand.is_busy or self.history is None:
             return
         label = self.history.redo_label
-        text = t("Done again: {label}", label=label) if label else t("Nothing to redo")
+        text = t("Redone: {label}", label=label) if label else t("Nothing to redo")
         self._travel(self.history.redo, text)
 
     def travel(self, index: int) -> None:

@@ -88,6 +88,7 @@ class Tasks:
         self._editor = editor
         self._posing = posing
         self.question: Question | None = None  # asked, not answered yet
+        self.lifts: Question | None = None  # whose answer is lifted at once
         self._plate: tuple[Wanted, Plate] | None = None  # of what was wanted
         self._no_plate: Wanted | None = None  # asked or failed for
         # What stays in front, as it was asked for last: its mask, and the answer
@@ -97,7 +98,7 @@ class Tasks:
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.question = self._plate = self._no_plate = self._front = None
+        self.question = self.lifts = self._plate = self._no_plate = self._front = None
 
     @property
     def pending(self) -> Prompt | None:
@@ -191,6 +192,11 @@ class Tasks:
 
     def _drop_question(self) -> None:
         self.question = None
+
+    def lift_when_selected(self) -> None:
+        """The object that is being selected is lifted as soon as its selection is there."""
+        self.lifts = self.question
+        self._editor.say(t("It is lifted as soon as it is selected"))
 
     def lift(self, shape: LiftSettings | None = None, label: str | None = None) -> None:
         """Asks for the current object in 3D; with another `shape`, which is a step of its own."""

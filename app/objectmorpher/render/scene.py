@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -64,7 +63,7 @@ class Scene:
     # objects to render, back to front, and between them what is rendered already
     objects: tuple[SplatObject | CanvasLayer, ...] = ()
     mask: Selection | None = None  # what `veil` and `hatch` refer to
-    touched: Sequence[Box] = ()  # of a mask that is painted in place: what changed, in its order
+    touched: tuple[Box, ...] = ()  # of a mask that is painted in place: what changed, in its order
     veil: float = 0.0  # share of black outside the mask
     hatch: Hatch | None = None  # inside the mask
     marks: Hatch | None = None  # on what an object invents, where its layer says so

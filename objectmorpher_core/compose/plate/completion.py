@@ -96,7 +96,7 @@ def complete(rgb: F32, known: F32, guide: Guide, seed: int, progress: Progress) 
     random = np.random.default_rng(seed)
     found: _Filling | None = None
     for n, level in enumerate(levels):
-        progress(n / len(levels), "Filling the background")
+        progress(n / len(levels), "Filling in the background")
         filling = _Filling(level, guide, random)
         if found is None:
             filling.guess()

@@ -79,7 +79,7 @@ def fill_squares(
     filled, rest = rgb.copy(), hole.copy()
     if not hole.any():
         return filled
-    progress(0.0, "Filling the background")
+    progress(0.0, "Filling in the background")
     found = squares(hole, filler.side)
     for k, square in enumerate(found):
         step = part(progress, k / len(found), (k + 1) / len(found))

@@ -56,7 +56,7 @@ class PatchMatchInpainter:
         filled = rgb.copy()
         if not hole.any():
             return filled
-        progress(0.0, "Filling the background")
+        progress(0.0, "Filling in the background")
         rows, columns = window = _window(hole, hints)
         crop, hole = rgb[window], hole[window]
         hints = tuple(hint.moved(-columns.start, -rows.start) for hint in hints)

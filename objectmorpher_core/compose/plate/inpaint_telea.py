@@ -29,7 +29,7 @@ class TeleaInpainter:
         filled = rgb.copy()
         if not hole.any():
             return filled
-        progress(0.0, "Filling the background")
+        progress(0.0, "Filling in the background")
         height, width = hole.shape
         shrink = min(1.0, (FILL_PIXELS / hole.size) ** 0.5)
         size = max(1, round(width * shrink)), max(1, round(height * shrink))

@@ -102,7 +102,7 @@ class ReliefLifter:
         outline = body.silhouette
         if not np.isfinite(body.middle[outline.inside]).all():
             raise LiftError("the field of view is too wide for the object to have a depth")
-        progress(0.3, "Placing Gaussians")
+        progress(0.3, "Building the 3D shape")
         rng = np.random.default_rng(seed)
         band = max(band_width(camera.width, camera.height), _softness(mask, matte, outline.extent))
         surface, spacing = spread(body, settings.count, band, rng, matte)

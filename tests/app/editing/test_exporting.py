@@ -205,6 +205,13 @@ def test_name_and_format_follow_each_other(moved: Editor, tmp_path: Path) -> Non
     assert exporting.problem is not None  # no such folder
     exporting.set_name("x.gif")
     assert exporting.problem is not None and "gif" in exporting.problem
+    exporting.set_name("x.xyz")
+    assert exporting.path.name == "x.xyz.png" and exporting.path.name in exporting.renaming
+    exporting.set_name("x.psd")
+    assert exporting.draft.what is What.LAYERS and exporting.problem is None
+    assert not exporting.renaming
+    exporting.set_name("x.png")
+    assert exporting.draft.what is What.PHOTO and exporting.path == tmp_path / "x.png"
     exporting.set_name("  ")
     assert exporting.problem == "Type a file name"
 
@@ -248,6 +255,24 @@ def test_the_last_choice_is_remembered(moved: Editor) -> None:
     assert (moved.exporting.draft.what, moved.exporting.draft.format) == (What.PHOTO, Format.PNG)
     moved.exporting.close()
     assert kept == What.CUTOUT.value and Tab().exported == "", "of another photo the photo first"
+
+
+def test_the_format_of_another_photo_is_not_offered_where_it_would_lose_something(
+    moved: Editor, ball: Document
+) -> None:
+    moved.settings = replace(moved.settings, export_format="JPEG")
+    moved.exporting.open()
+    assert moved.exporting.draft is not None
+    assert moved.exporting.draft.format is Format.JPEG
+    picture = ball.photo.picture
+    clear = replace(picture, alpha=np.full(picture.pixels.shape[:2], 99, np.uint8))
+    deep = replace(picture, pixels=picture.pixels.astype(np.uint16) * 257)
+    for kept, wrong in ((clear, "JPEG"), (deep, "JPEG"), (deep, "WebP")):
+        moved.start(Document(replace(ball.photo, picture=kept)))
+        moved.settings = replace(moved.settings, export_format=wrong)
+        moved.exporting.open()
+        assert moved.exporting.draft.format is Format.PNG, "its own"
+    moved.exporting.close()
 
 
 @pytest.mark.parametrize("name", ["/", "..", "~", "~nobody/x", "x" * 300, "a/b", ".", "\0"])

@@ -59,7 +59,7 @@ def test_the_view_of_a_moved_copy_keeps_the_object(copied: Editor) -> None:
     document, view = copied.document, copied.view
     assert document is not None
     assert drawn_order(document, Shown.COMPOSITE, partial(copied.derived.posed, document)) == [0, 1]
-    assert not copied.derived.moved_mask(document).any()
+    assert copied.derived.unfilled(edits.set_plate(document, None)) is None
     plate = copied.derived.plate(document)
     assert plate is not None and not plate.hole.any()
     blend = build_frame(document, view, copied.cache).blend
@@ -70,6 +70,8 @@ def test_the_view_of_a_moved_copy_keeps_the_object(copied: Editor) -> None:
 
 def test_copies_are_known_as_copies_in_a_session_too(copied: Editor) -> None:
     assert copied.document is not None
+    assert [o.name for o in copied.document.objects] == ["Object 1", "Object 1 copy"]
+    assert edits.duplicate(copied.document, 1).objects[2].name == "Object 1 copy 2"
     again = decode_session(encode_session(copied.document))
     assert again.objects[0].mask is again.objects[1].mask
 

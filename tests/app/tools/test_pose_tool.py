@@ -310,10 +310,13 @@ def test_a_drag_or_a_turn_that_comes_back_is_none(posed: Editor) -> None:
 
 
 def test_p_pins_what_is_under_the_pointer_and_a_handle_that_is(posed: Editor) -> None:
+    run(posed, "pin")
+    assert posed.message is not None, "where to point"
     place = at(posed, 90, 60)
     TOOL.hover(posed, Pointer(*place))
     posed.pointer = Pointer(*place)
     run(posed, "pin")
+    assert posed.message is None
     assert posed.object is not None and posed.object.handles[0].is_pin
     TOOL.hover(posed, Pointer(*place))
     run(posed, "pin")

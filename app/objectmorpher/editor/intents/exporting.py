@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.document.key_edits import count_keys
-from objectmorpher_core.pictures.formats import LOSSLESS_AT_100
+from objectmorpher_core.pictures.formats import LOSSLESS_AT_100, Trait
 from objectmorpher_core.pictures.guests import missing_jxl
 
 from ...system import clipboard
@@ -69,10 +69,12 @@ class Exporting:
         what = next((w for w in What if w.value == editor.tab.exported), What.PHOTO)
         what = what if self.why_not(what) is None else What.PHOTO
         format = next((f for f in Format if f.value == settings.export_format), self.own_format)
+        if not editor.tab.exported and not self._is_held_by(format):
+            format = self.own_format
         file = editor.source or editor.path
         last = Path(settings.export_folder)
         is_kept = file is None and settings.export_folder and last.is_dir()
-        folder = file.parent if file else (last if is_kept else pictures_folder())
+        folder = file.absolute().parent if file else (last if is_kept else pictures_folder())
         motion = next(
             (m for m in VideoMotion if m.value == settings.export_motion), VideoMotion.MORPH
         )
@@ -148,9 +150,11 @@ class Exporting:
         self._change(replace(self._draft, seconds=seconds))
 
     def set_name(self, name: str) -> None:
-        """Take a name as it was typed; an ending chooses the format."""
+        """Take a name as it was typed; an ending chooses the format, and layers by theirs."""
         draft = replace(self._draft, name=name)
-        format = format_of(name.strip())
+        format, what = format_of(name.strip()), _what_of(Path(name.strip()))
+        if draft.what in (What.PHOTO, What.LAYERS) and format in FORMATS[what]:
+            draft = replace(draft, what=draft.what if self.why_not(what) else what)
         if format is not None and format in FORMATS[draft.what]:
             draft = replace(draft, format=format)
         self._change(draft)
@@ -235,22 +239,36 @@ class Exporting:
     def problem(self) -> str | None:
         """Why this cannot be written, one sentence; None where it can be tried."""
         draft, path = self._draft, self.path
-        ending = Path(draft.name.strip()).suffix
         if not draft.name.strip():
             return t("Type a file name")
         if (reason := self.why_not(draft.what)) is not None:
             return reason
         if draft.what is What.VIDEO and (reason := self.why_no_motion(draft.motion)) is not None:
             return reason
-        if not self.is_folder and _is_other_kind(path.name, FORMATS[draft.what]):
-            known = ", ".join(f.value for f in FORMATS[draft.what])
-            return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
+        if not self.is_folder and format_of(path.name) not in FORMATS[draft.what]:
+            return self._why_no_ending(path.suffix)
         if (reason := self.why_no_format(draft.format)) is not None:
             return reason
         try:
             return self._cannot_be_there(path)
         except (OSError, RuntimeError, ValueError):  # a name that no disk can hold
             return t("This is no name for a file")
+
+    def _why_no_ending(self, ending: str) -> str:
+        """Why this cannot be written into a file with that ending."""
+        what = self._draft.what
+        if what is What.PHOTO and format_of(ending) in FORMATS[What.LAYERS]:
+            reason = self.why_not(What.LAYERS)
+            return t("{ending} holds layers. {reason}", ending=ending, reason=reason)
+        known = ", ".join(f.value for f in FORMATS[what])
+        return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
+
+    @property
+    def renaming(self) -> str:
+        """What the file will be called, where the typed ending is none that is known; else ""."""
+        name, path = self._draft.name.strip(), self.path
+        is_known = self.is_folder or not Path(name).suffix or format_of(name) is not None
+        return "" if is_known else t("The file will be called {name}", name=path.name)
 
     def confirm(self) -> None:
         """Exports; asks once more where that replaces a file."""
@@ -352,6 +370,13 @@ class Exporting:
         own = None if document is None else format_of(document.photo.name)
         return own if own is not None and own in FORMATS[What.PHOTO] else Format.PNG
 
+    def _is_held_by(self, format: Format) -> bool:
+        """Whether a format holds the photo's bits and transparency."""
+        document = self._editor.committed
+        has_alpha = document is not None and document.photo.picture.alpha is not None
+        is_deep_enough = format.has_16_bits or self.own_bits == 8
+        return is_deep_enough and (Trait.ALPHA in format.traits or not has_alpha)
+
     def _why_no_shape(self) -> str | None:
         document, current = self._editor.committed, self._editor.current
         objects = () if document is None else document.objects
@@ -410,14 +435,6 @@ class Exporting:
 def _what_of(path: Path) -> What:
     """What a file of that name holds: layers where it can, else the edited photo."""
     return What.LAYERS if format_of(path.name) in FORMATS[What.LAYERS][:-1] else What.PHOTO
-
-
-def _is_other_kind(name: str, formats: tuple[Format, ...]) -> bool:
-    """Whether the ending of a typed name is that of a kind that is not offered."""
-    if format_of(name) is not None:
-        return format_of(name) not in formats
-    ending = Path(name).suffix
-    return 2 < len(ending) < 6 and ending[1:].isalpha()
 
 
 def _without_ending(name: str) -> str:

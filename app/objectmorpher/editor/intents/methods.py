@@ -96,7 +96,7 @@ class Methods:
             if self._offer(stage) is not None:
                 return t("The server has no network for it")
             if stage in self._stages:
-                return t("No network for it is here: Window > Models… gets one")
+                return t("No refinement model is installed: Window > Models… gets one")
         return next(m.why_not for m in self.of(stage) if m.name == chosen)
 
     @property

@@ -239,7 +239,7 @@ class Placing:
         if editor.document is None or not editor.is_lifted or editor.hand.is_busy:
             return
         is_on = not self.is_grounded
-        label = t("Move over the ground") if is_on else t("Move freely")
+        label = t("Move along the ground") if is_on else t("Move freely")
         editor.apply(label, edits.set_grounded(editor.document, editor.current, is_on))
         self.say_why_no_ground()
 

@@ -170,7 +170,7 @@ class Posing:
         editor = self._editor
         if editor.pointer is None or editor.document is None or editor.hand.is_busy:
             return
-        h = editor.hover.handle
+        h, editor.message = editor.hover.handle, None  # what stood in the way does not any more
         if h is not None and editor.object is not None:
             is_pin = not editor.object.handles[h].is_pin
             self.hold(edits.set_pin(editor.document, editor.current, h, is_pin))

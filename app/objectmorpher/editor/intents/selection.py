@@ -159,7 +159,9 @@ class Selection:
             return
         if question.combine in (Combine.ANEW, Combine.REFINED):
             self._told = editor.mask, found.confidence
-        if not found.is_final:
+        if question is self._tasks.lifts and k == editor.current and not editor.is_lifted:
+            self._tasks.lift()
+        elif not found.is_final:
             self._closer_look.begin(question, base, asked or question.prompt)
 
     def improve(self, question: Question, base: SelectionMask | None, found: Found) -> None:

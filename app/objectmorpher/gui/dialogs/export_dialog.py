@@ -164,8 +164,8 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     """What is wrong, or what will be replaced; Cancel and the button that does it."""
     problem = exporting.problem
     imgui.dummy(theme.size(0, 4))
-    warning = t("{name} is there already.", name=exporting.path.name)
-    text = problem or (warning if exporting.is_replacing else "")
+    warning = t("{name} already exists.", name=exporting.path.name)
+    text = problem or (warning if exporting.is_replacing else exporting.renaming)
     imgui.push_style_color(imgui.Col_.text, theme.vec("warning"))
     imgui.push_text_wrap_pos(0.0)
     imgui.text_unformatted(text or " ")

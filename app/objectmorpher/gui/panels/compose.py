@@ -179,7 +179,7 @@ def _draw_shadow(editor: Editor) -> None:
     changed = replace(shadow, strength=change.value / 100)
     take(editor, change, lambda: preview(changed), t("Shadow's strength"))
     if shadow.strength == 0 and not change.is_changed:
-        note(t("Strength adds a shadow on the ground."))
+        note(t("Raise Strength to add a shadow on the ground."))
         return
     shares = (
         (Number(t("Length"), "%.2f ×", 0.005, 0.1, 0.6, 0.0, MOST_SHADOW), "length", 1.0),
@@ -333,7 +333,7 @@ def _draw_edge(editor: Editor) -> None:
 
 def draw_network(editor: Editor) -> None:
     """Which network, its buttons, and how much of what it made is shown."""
-    heading(t("Network"))
+    heading(t("AI refinement"))
     draw_method(editor, "refine")
     if (reason := editor.methods.why_not("refine")) is not None:
         note(f"{sentence(reason)}.")

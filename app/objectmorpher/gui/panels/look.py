@@ -184,7 +184,7 @@ def _draw_symmetry(editor: Editor) -> None:
     choices: tuple[Segment[bool | None], ...] = (
         Segment(None, t("Auto"), t("Left and right are taken to be alike where they look so")),
         Segment(True, t("Symmetric"), t("Left and right are alike: what is hidden is mirrored")),
-        Segment(False, t("Not"), t("Left and right have nothing to do with each other")),
+        Segment(False, t("None"), t("Left and right have nothing to do with each other")),
     )
     note(t("Symmetry"))
     chosen = segmented("symmetry", choices, editor.shaping.settings.is_symmetric)

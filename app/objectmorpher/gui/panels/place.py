@@ -91,7 +91,7 @@ def draw_place(editor: Editor) -> None:
 
 
 def _draw_ground(editor: Editor) -> None:
-    is_on = checkbox(t("Move over the ground"), editor.placing.is_grounded)
+    is_on = checkbox(t("Move along the ground"), editor.placing.is_grounded)
     tooltip(t("Moving the object slides it over the ground; its size follows the distance (G)"))
     if is_on != editor.placing.is_grounded:
         run(editor, "ground")

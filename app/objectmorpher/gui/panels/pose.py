@@ -64,7 +64,7 @@ def draw_pose(editor: Editor) -> None:
     _draw_overlays(editor)
     gap(12)
     half = half_width()
-    command_button(editor, "reset_handles", t("All to rest"), half)
+    command_button(editor, "reset_handles", width=half)
     imgui.same_line()
     command_button(editor, "reset_pose", f"{Icon.RESET}  {t('Reset pose')}", half)
     gap(12)

@@ -50,7 +50,7 @@ def draw_edge(editor: Editor) -> None:
     draw_pair(editor, "fill_holes", "remove_islands")
     draw_command(editor, "invert")
     if editor.masking.is_soft:
-        note(t("Part of this edge is soft by your hand, and stays as you painted it."))
+        note(t("You softened part of this edge by hand; it is kept."))
         draw_command(editor, "harden")
     gap(12)
     heading(t("Mask file"))
@@ -238,7 +238,7 @@ def _draw_facts(editor: Editor) -> None:
         share = f"{100 * editor.selection.share:.1f} %"
         facts.append(t("{share} of the photo is selected.", share=share))
     if removes or adds > 1:
-        facts.append(t("Clicks: {adds} on it, {removes} beside it.", adds=adds, removes=removes))
+        facts.append(t("Clicks: {adds} added, {removes} removed.", adds=adds, removes=removes))
     if editor.object is not None and editor.object.found is not None:
         facts.append(t("What you painted stays when you click again."))
     if facts:

@@ -10,7 +10,7 @@ from imgui_bundle import ImVec2, imgui
 from ...editor.editor import Editor
 from ...system.texts import t
 from .theme import FIELD, Icon, theme
-from .widgets import bold_text, icon_button, note
+from .widgets import bold_text, icon_button, note, sought
 
 # The frame that panels over the window share: title, close button, a place in the middle.
 
@@ -67,6 +67,7 @@ def label(text: str) -> None:
     """The name of the field that is drawn next."""
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.vec("secondary"), text)
+    sought.meet(text)
     imgui.same_line(theme.pt(LABEL))
 
 

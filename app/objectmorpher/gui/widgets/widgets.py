@@ -18,7 +18,7 @@ from ...render.gpu_memory import PictureTexture
 from ...render.renderer import Renderer
 from ...system.texts import t
 from ...tools.pointer import SNAP
-from ..window.landmarks import mark
+from ..window.landmarks import mark, mark_on_canvas
 from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 
 # Small pictures in panels: thumbnails, on the GPU as long as they are drawn.
@@ -85,16 +85,22 @@ def bold_text(size: float = 0.0) -> Iterator[None]:
     imgui.pop_font()
 
 
-def tooltip(text: str) -> None:
+def tooltip(text: str, is_above: bool = False) -> None:
     """Show a tooltip over the last item after a moment, also where the item is greyed out.
 
-    Where the keyboard has come to the item, it is shown at once, beside the item.
+    Where the keyboard has come to the item, it is shown at once, beside the item. `is_above`:
+    above the item, where below it would hide the next one.
     """
     flags = imgui.HoveredFlags_.allow_when_disabled | imgui.HoveredFlags_.for_tooltip
     is_reached = imgui.is_item_focused() and imgui.get_io().nav_visible
-    if is_reached:
+    is_shown = is_reached or imgui.is_item_hovered(flags)
+    if is_shown and is_above:
+        low = imgui.get_item_rect_min()
+        at = ImVec2(low.x, low.y - theme.pt(TIP_GAP))
+        imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(0.0, 1.0))
+    elif is_reached:
         _place_tooltip()
-    if is_reached or imgui.is_item_hovered(flags):
+    if is_shown:
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(10, 8))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(RADIUS))
         imgui.begin_tooltip()
@@ -204,10 +210,56 @@ def shown_path(path: Path) -> str:
     return str(Path("~", path.relative_to(home))) if path.is_relative_to(home) else str(path)
 
 
+# The setting that somebody looks for: scrolled to, and framed until the next click.
+
+PATIENCE = 60  # frames in which it has to come up
+
+
+class Sought:
+    """One instance, `sought`."""
+
+    def __init__(self) -> None:
+        self._text = ""  # "" for none
+        self._since = self._seen = 0  # frames: when it was looked for, and shown last (0: not yet)
+
+    def begin(self, text: str) -> None:
+        """Look for the row of that name, which is drawn soon."""
+        self._text, self._since, self._seen = text, imgui.get_frame_count(), 0
+
+    def meet(self, text: str, has_field: bool = True) -> None:
+        """The last item is the name of a row; `has_field`: what it names is beside it."""
+        now = imgui.get_frame_count()
+        if text != self._text or not text or now == self._seen:
+            return
+        late = now - self._seen > 1 if self._seen else now - self._since > PATIENCE
+        if late or imgui.is_mouse_clicked(0):
+            self._text = ""
+            return
+        if not self._seen:
+            imgui.set_scroll_here_y(0.5)
+        self._seen = now
+        low, high, gap = imgui.get_item_rect_min(), imgui.get_item_rect_max(), theme.pt(5)
+        across = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+        height = imgui.get_frame_height() if has_field else high.y - low.y
+        height = max(height, high.y - low.y) / 2 + theme.pt(3)
+        middle, right = (low.y + high.y) / 2, max(across, high.x) + gap
+        low, high = ImVec2(low.x - gap, middle - height), ImVec2(right, middle + height)
+        ink, draw = theme.u32("accent"), imgui.get_window_draw_list()
+        top, bottom = draw.get_clip_rect_min().y, draw.get_clip_rect_max().y  # beyond its sides
+        draw.push_clip_rect(ImVec2(low.x - gap, top), ImVec2(right + gap, bottom))
+        draw.add_rect(low, high, ink, theme.pt(RADIUS), thickness=theme.pt(2))
+        draw.pop_clip_rect()
+        mark_on_canvas("Sought", low, high)
+
+
+sought = Sought()
+
+
 def heading(text: str) -> None:
     """The title of a group in a panel."""
     with bold_text():
         imgui.text_unformatted(text)
+    sought.meet(text, has_field=False)
 
 
 def note(text: str) -> None:
@@ -217,6 +269,7 @@ def note(text: str) -> None:
     imgui.text_unformatted(text)
     imgui.pop_text_wrap_pos()
     imgui.pop_style_color()
+    sought.meet(text, has_field=False)
 
 
 def gap(points: float) -> None:
@@ -277,7 +330,8 @@ def number_field(number: Number, value: float) -> FieldChange:
     imgui.text_colored(theme.vec("secondary"), number.name)
     if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
         changed = FieldChange(number.rest, is_changed=value != number.rest, is_done=True)
-    tooltip(t("Double-click resets it"))
+    sought.meet(number.name)
+    tooltip(t("Double-click resets it"), is_above=True)
     room = imgui.calc_text_size(number.name).x + theme.pt(NAME_GAP)
     imgui.same_line(max(theme.pt(LABEL_WIDTH), room))
     field = imgui.get_content_region_avail().x - 2 * theme.pt(STEPPER + 2)
@@ -321,6 +375,7 @@ def checkbox(label: str, is_on: bool) -> bool:
         imgui.push_style_color(getattr(imgui.Col_, column), theme.vec(role))
     is_on = imgui.checkbox(label, is_on)[1]
     mark(label)
+    sought.meet(label)
     imgui.pop_style_color(3)
     imgui.pop_style_var(2)
     return is_on

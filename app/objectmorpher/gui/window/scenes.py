@@ -46,12 +46,13 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     split = view.split or 0.0
     if shown in BARE:
         return replace(_bare(editor, document, renderer, shown), split=split)
-    frame = build_frame(document, view, editor.cache, shown, renderer)
-    mask, hatch = None, None
-    if document.plate is None and is_edited:
-        mask, hatch = editor.derived.moved_mask(document), MISSING
-    elif shown is Shown.PROVENANCE:
-        mask, hatch = editor.derived.invented_background(document), INPAINTED
+    filled = editor.derived.with_background(document)
+    frame = build_frame(filled, view, editor.cache, shown, renderer)
+    mask, hatch = editor.derived.unfilled(document), MISSING
+    if mask is None:
+        is_told = filled.plate is not None and shown is Shown.PROVENANCE
+        mask = editor.derived.invented_background(filled) if is_told else None
+        hatch = INPAINTED if is_told else None
     layers, objects = (*frame.layers, *frame.refined), ()
     if renderer == "gl":
         layers, objects = (), (*splat_objects(document, frame), *frame.refined)
@@ -94,7 +95,7 @@ def _selecting(editor: Editor, document: Document) -> Scene:
     return Scene(
         document.photo.pixels, theme.rgb("surround"), layers=() if tint is None else (tint,),
         mask=selection,
-        touched=painting.touched if painting else (), veil=strength if is_veiled else 0.0,
+        touched=tuple(painting.touched) if painting else (), veil=strength if is_veiled else 0.0,
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from ..widgets.widgets import icon_button, small_text, tooltip
 from .landmarks import mark
 
 JOB_DELAY = 0.15  # s; a job that is faster shows no bar
+LEAST_AREA = 0.05  # megapixels that are told
 BAR = 120.0  # points
 BAR_HEIGHT = 6.0
 
@@ -42,7 +43,8 @@ def _facts(editor: Editor) -> str:
         return ""
     zoom = editor.view.zoom * 100
     megapixels = size[0] * size[1] / 1e6
-    return f"{_pixel(editor)}{zoom:.0f} %   ·   {size[0]} × {size[1]}   ·   {megapixels:.1f} MP"
+    area = f"   ·   {megapixels:.1f} MP" if megapixels >= LEAST_AREA else " px"
+    return f"{_pixel(editor)}{zoom:.0f} %   ·   {size[0]} × {size[1]}{area}"
 
 
 def _pixel(editor: Editor) -> str:

@@ -8,15 +8,15 @@ from functools import partial
 
 from imgui_bundle import ImVec2, imgui
 
-from ....commands import COMMANDS, GROUPS, SETTINGS, keys_of, run, why_not
+from ....commands import COMMANDS, GROUPS, OTHER_WORDS, SETTINGS, keys_of, run, why_not
 from ....editor.editor import Editor
 from ....editor.shortcuts import GESTURES
 from ....editor.view import Popup
 from ....system.help_pages import pages
-from ....system.texts import t
+from ....system.texts import languages, t
 from ...widgets.modal import popup
 from ...widgets.theme import theme
-from ...widgets.widgets import fitted, tooltip
+from ...widgets.widgets import fitted, sought, tooltip
 from ...window.landmarks import mark
 
 SIZE = (600.0, 480.0)  # points
@@ -36,6 +36,7 @@ class Entry:
     keys: str
     choose: Callable[[Editor], None]
     command: str = ""  # of COMMANDS, where it is one
+    words: str = ""  # by which it is found, too
 
 
 class CommandPalette:
@@ -104,14 +105,15 @@ class CommandPalette:
         ranked = []
         for place, entry in enumerate(_entries(editor)):
             title = t(entry.title).casefold()
-            whole = f"{title} {entry.group.casefold()} {entry.keys.casefold()}"
+            whole = f"{title} {entry.group} {entry.keys} {entry.words}".casefold()
             if not all(word in whole for word in words):
                 continue
             is_known = entry.title in self._recent
             recent = self._recent.index(entry.title) if is_known else len(self._recent)
             starts = not words or title.startswith(words[0])
             inside = all(word in title for word in words)
-            order = (recent,) if not words else (not starts, not inside, recent)
+            is_meant = all(word in f"{title} {entry.words}" for word in words)
+            order = (recent,) if not words else (not starts, not inside, not is_meant, recent)
             ranked.append((*order, place, entry))
         return [row[-1] for row in sorted(ranked, key=lambda row: row[:-1])]
 
@@ -128,16 +130,32 @@ def _entries(editor: Editor) -> list[Entry]:
     def go(name: str, editor: Editor) -> None:
         run(editor, name)
 
+    def find(name: str, label: str, editor: Editor) -> None:
+        """The row of a setting, in the panel that has it."""
+        reason = why_not(editor, name)
+        run(editor, name)
+        if reason is None:
+            if name != "preferences" and not editor.view.has_panel:
+                editor.view.wants_panel = True
+            sought.begin(t(label))
+
     found = [
-        Entry(t(COMMANDS[name].label), t(title), keys_of(editor, name), partial(go, name), name)
+        Entry(
+            t(command.label), t(title), keys_of(editor, name), partial(go, name), name,
+            OTHER_WORDS.get(command.label, ""),
+        )
         for title, commands in GROUPS.items()
-        for name in commands
+        for name, command in commands.items()
         if name != SELF
-    ]
+    ]  # fmt: skip
     for name, labels in SETTINGS.items():
         where = t(COMMANDS[name].label)
         group = t("Setting: {where}", where=where)
-        found += [Entry(t(label), group, "", partial(go, name), name) for label in labels]
+        found += [
+            Entry(t(label), group, "", partial(find, name, label), name, OTHER_WORDS.get(label, ""))
+            for label in labels
+            if label != "Language" or len(languages()) > 1
+        ]
     found += [Entry(page.title, t("Help"), "", partial(read, page.name)) for page in pages()]
     for tool, rows in GESTURES.items():
         label = t("Pointer: {tool}", tool=t(tool))

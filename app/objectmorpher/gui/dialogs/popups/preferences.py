@@ -56,7 +56,7 @@ def _draw_look(editor: Editor) -> None:
         _prefer(editor, "language", segmented("language", names, settings.language))
     label(t("Motion"))
     motions = (
-        Segment(AUTO, t("The system's")),
+        Segment(AUTO, t("As the system")),
         Segment(FULL, t("Full")),
         Segment(REDUCED, t("Reduced"), t("Nothing fades or blinks")),
     )
@@ -80,7 +80,7 @@ def _draw_screen(editor: Editor) -> None:
     else:
         _prefer(editor, "screen_profile", wanted)
     if editor.looking.screen_profile() is None and chosen != AS_THEY_ARE:
-        note(t("No profile of the screen was found: it is taken for sRGB."))
+        note(t("No screen profile found: sRGB is assumed."))
 
 
 def _draw_files(editor: Editor) -> None:
@@ -126,7 +126,7 @@ class ComputeFields:
             if chosen != editor.settings.compute:
                 computing.choose(chosen)
         if not computing.is_elsewhere:
-            note(t("A server, `objectmorpher serve`, can select, lift, fill in and refine for it."))
+            note(t("A server (objectmorpher serve) can select, lift, fill in and refine for it."))
             return
         if not computing.is_given:
             self._draw_address(editor)
