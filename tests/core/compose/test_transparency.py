@@ -14,11 +14,18 @@ from PIL import Image
 
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.compose.order import holes
+from objectmorpher_core.compose.plate.plate import plate_cover, plate_of_holes
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Photo, Placement, Prompt
 from objectmorpher_core.document.settings import Shadow
-from objectmorpher_core.document.transparency import continued, on_checker, with_opacity
+from objectmorpher_core.document.transparency import (
+    continued,
+    on_checker,
+    seen,
+    seen_plate,
+    with_opacity,
+)
 from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
 from objectmorpher_core.pipeline import lift_mask, make_plate, replay
 from objectmorpher_core.scripting.animation import Clip, frames
@@ -278,3 +285,22 @@ def test_on_the_canvas_clear_ground_is_a_checker():
     assert len(np.unique(shown[clear], axis=0)) == 2
     part = on_checker(picture.pixels[30:, 50:], picture.alpha[30:, 50:], SIZE, 50, 30)
     assert np.array_equal(part, shown[30:, 50:]), "a part of it lies on the same squares"
+
+
+@kinds
+def test_the_canvas_shows_what_the_file_holds(kind: str):
+    """The background of the view, and an object over it, on the checker's squares."""
+    document = _moved(_scene(kind))
+    photo, gone = document.photo, holes(document)
+    plate = seen_plate(photo, plate_of_holes(document, gone), gone)
+    assert plate is not None
+    x0, y0, x1, y1 = plate.box
+    canvas = seen(photo).copy()
+    canvas[y0:y1, x0:x1] = plate.pixels
+    top = np.iinfo(canvas.dtype).max
+    alone = output_picture("object", replay(document))
+    share = alone.alpha[..., None] / top
+    canvas = share * alone.pixels + (1 - share) * canvas
+    result = composite(document)
+    off = np.abs(canvas - on_checker(result.pixels, result.alpha, SIZE)).max(-1)
+    assert off.mean() < 0.005 * top and np.percentile(off, 99) < 0.03 * top
