@@ -316,7 +316,8 @@ class Result:
     ) -> Iterator[np.ndarray]:
         """The pictures (h, w, 3) u8 of a video, one after the other; see `save`.
 
-        Raises ValueError where nothing moves.
+        They are (h, w, 4) where the photo has an alpha channel. Raises ValueError where nothing
+        moves.
         """
         clip = Clip(video, seconds, rate)
         return frames(self.edited.document, clip)

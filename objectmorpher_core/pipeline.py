@@ -161,7 +161,7 @@ def export(
 ) -> Picture:
     """The edited photo, with everything of the file that the edit does not concern."""
     result = composite(document, puppets, progress)
-    return replace(document.photo.picture, pixels=result.pixels)
+    return result.picture(document.photo.picture)
 
 
 @dataclass(frozen=True, eq=False)
@@ -539,5 +539,5 @@ def _finished(
     with stopwatch.stage("render"):
         result = composite(document, puppets, part(progress, 0.85, 1.0))
     progress(1.0, "Done")
-    picture = replace(document.photo.picture, pixels=result.pixels)
+    picture = result.picture(document.photo.picture)
     return Edited(document, result, picture, puppets, energies, stopwatch)

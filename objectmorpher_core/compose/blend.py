@@ -39,7 +39,7 @@ class Rows:
 
     left: int  # px, corner in the photo
     top: int
-    colour: F32  # (h, w, 3) sRGB in [0, 1]
+    colour: F32  # (h, w, 3) sRGB in [0, 1]; premultiplied by `cover`, where there is one
     from_photo: F32  # shares of the colour; with that of paint they sum to 1
     from_lifter: F32
     from_inpainter: F32
@@ -48,6 +48,7 @@ class Rows:
     touched: F32 | None = None  # in [0, 1], what changes in place: shadows, repairs, colours
     is_object: Mask | None = None  # what objects alone cover, where more is covered; None: all is
     from_paint: F32 | None = None  # None: nothing is painted
+    cover: F32 | None = None  # alpha; None: all is opaque
 
     @property
     def box(self) -> Box:
@@ -59,6 +60,12 @@ class Rows:
     def bottom(self) -> int:
         """Px, the row of the photo below them."""
         return self.top + len(self.moved)
+
+    def cover_under(self, alpha: F32) -> F32 | None:
+        """Their alpha under something of `alpha` (h, w)."""
+        if self.cover is None:
+            return None
+        return np.asarray(self.cover + alpha * (1 - self.cover), np.float32)
 
 
 def map_in_threads(run: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
@@ -143,6 +150,20 @@ def differ(one: Pixels, other: Pixels) -> Mask:
     return is_other[..., 0] | is_other[..., 1] | is_other[..., 2]
 
 
+def _mixed_straight(
+    photo: F32, alpha: F32, colour: F32, cover: F32, weights: F32
+) -> tuple[F32, F32]:
+    """A straight `photo` (h, w, 3) with `alpha` mixed with a premultiplied `colour` with `cover`.
+
+    Returns straight colours and alpha: what is hardly there lends no colour to what is.
+    """
+    own = photo * alpha[..., None]
+    mixed = own + weights[..., None] * (colour - own)
+    there = alpha + weights * (cover - alpha)
+    straight = mixed / np.maximum(there, np.float32(1e-6))[..., None]
+    return np.asarray(straight, np.float32), np.asarray(there, np.float32)
+
+
 class Blend:
     """The photo with the edit blended in, as far as its rows have come."""
 
@@ -154,10 +175,12 @@ class Blend:
         rows: int | None = None,
         feather: float = 1.0,
         keeps_weights: bool = False,
+        alpha: np.ndarray | None = None,
     ) -> None:
         """The edit is in `box`, and shows `margin` px around what it disturbs.
 
-        At least `rows` are blended at a time. `feather`: see `blend_weights`.
+        At least `rows` are blended at a time. `feather`: see `blend_weights`. `alpha` (H, W) is
+        the photo's, straight; where it has one, the rows have a cover.
         """
         self._feather = feather
         x0, y0, x1, y1 = box
@@ -165,8 +188,9 @@ class Blend:
         self.weights = np.zeros((y1 - y0, x1 - x0), np.float32) if keeps_weights else None
         self._corner = x0, y0
         self.pixels = photo.copy()
+        self.alpha = None if alpha is None else alpha.copy()
         self.footprint = np.zeros(photo.shape[:2], bool)
-        self._photo, self._margin = photo, margin
+        self._photo, self._alpha, self._margin = photo, alpha, margin
         self._reach = math.ceil(margin) + 2  # rows from which on a distance does not matter
         self._rows: list[Rows] = []  # not blended yet, or needed by those that are not
         self._blended, self._bottom = box[1], box[3]  # px, rows of the photo
@@ -196,7 +220,7 @@ class Blend:
         if beside is not None:
             x0, x1 = self._corner[0], self._corner[0] + beside.shape[1]
             done = np.s_[ready[0].top : ready[-1].bottom, x0:x1]
-            is_changed = differ(self.pixels[done], self._photo[done])
+            is_changed = self._differ(done)
             is_beside = beside[ready[0].top - top : ready[-1].bottom - top]
             self.beside += int(np.count_nonzero(is_changed & is_beside))
         self._blended = ready[-1].bottom
@@ -219,12 +243,20 @@ class Blend:
         if not weights.any():
             return 0.0, 0.0, 0.0, 0.0
         old = self._photo[y0:y1, x0:x1]
-        photo = unit_pixels(old)
-        mixed = photo + weights[..., None] * (rows.colour - photo)
+        photo, is_changed = unit_pixels(old), weights > 0
+        if self._alpha is None or self.alpha is None or rows.cover is None:
+            mixed = photo + weights[..., None] * (rows.colour - photo)
+        else:
+            alpha = self._alpha[y0:y1, x0:x1]
+            own = unit_pixels(alpha)
+            mixed, cover = _mixed_straight(photo, own, rows.colour, rows.cover, weights)
+            cover = np.where(is_changed, pixels_from_unit(cover, alpha.dtype), alpha)
+            is_changed = is_changed & ((cover > 0) | (alpha > 0))  # what is not seen stays
+            self.alpha[y0:y1, x0:x1] = cover
         # Where the blend is nothing, or changes nothing, the photo's own integers stay.
-        new = np.where((weights > 0)[..., None], pixels_from_unit(mixed, old.dtype), old)
+        new = np.where(is_changed[..., None], pixels_from_unit(mixed, old.dtype), old)
         self.pixels[y0:y1, x0:x1] = new
-        changed = differ(new, old)
+        changed = self._differ(np.s_[y0:y1, x0:x1])
         shown = weights[changed]
 
         def total(values: np.ndarray) -> float:
@@ -236,6 +268,13 @@ class Blend:
             total(shown * rows.from_inpainter[changed]),
             0.0 if rows.from_paint is None else total(shown * rows.from_paint[changed]),
         )
+
+    def _differ(self, part: tuple[slice, slice]) -> Mask:
+        """Where the picture is not the photo, in colour or alpha."""
+        changed = differ(self.pixels[part], self._photo[part])
+        if self._alpha is not None and self.alpha is not None:
+            changed |= self.alpha[part] != self._alpha[part]
+        return changed
 
     def shares(self) -> Sums:
         """The shares of photo, lifter, inpainter and paint in the changed pixels; else all 0."""

@@ -20,6 +20,8 @@ from ..deform.puppet import Puppet, puppet_of
 from ..document.bounds import MULTIPLY, NORMAL, SCREEN
 from ..document.model import Document, EditObject, Matte, Placement, Plate
 from ..document.settings import AS_IN_THE_PHOTO, Refined
+from ..document.transparency import alpha_behind
+from ..pictures.image import Picture
 from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
@@ -93,6 +95,11 @@ class Composite:
     box: Box | None = None  # of the photo, outside which nothing was looked at; None: all of it
     weights: F32 | None = None  # (h, w) of the box, how much of the edit is shown; if asked for
     shadow: int = 0  # px of `changed` that no object reaches: shadows and repairs
+    alpha: np.ndarray | None = None  # (H, W) of the pixels, straight; None: the photo has none
+
+    def picture(self, photo: Picture) -> Picture:
+        """The edited `photo`, with everything of the file that the edit does not concern."""
+        return replace(photo, pixels=self.pixels, alpha=self.alpha)
 
     @property
     def moved(self) -> tuple[Moved, ...]:
@@ -113,29 +120,32 @@ def composite(
     them. It changes no pixel how many that are. `keeps_weights`: for `layers`.
     """
     photo, camera = document.photo.pixels, document.photo.camera
+    alpha = document.photo.picture.alpha
     things = _stack(document, puppets or {})
     if not any(thing.item.is_moved for thing in things):
         nothing = np.zeros(photo.shape[:2], bool)
-        return Composite(photo, nothing, 0, 0, Shares(), camera, ())
+        return Composite(photo, nothing, 0, 0, Shares(), camera, (), alpha=alpha)
     margin = document.feather * hole_margin(camera.width, camera.height)
-    plate = plate_of_holes(document, holes(document))
+    gone = holes(document)
+    plate = plate_of_holes(document, gone)
     drawing = _Drawing(things, camera, margin, plate)
+    behind = alpha if alpha is None or plate is None else alpha_behind(alpha, plate, gone)
     _, y0, _, y1 = drawing.box
-    blend = Blend(photo, margin, drawing.box, rows, document.feather, keeps_weights)
+    blend = Blend(photo, margin, drawing.box, rows, document.feather, keeps_weights, alpha)
     for top, bottom in drawing.strips():
         progress((top - y0) / (y1 - y0), "Drawing the object")
-        for drawn in drawing.over_plate(photo, top, bottom):
+        for drawn in drawing.over_plate(photo, behind, top, bottom):
             blend.add(drawn)
     pixels, footprint, share = blend.pixels, blend.footprint, 0.0
     if document.refined is not None:
         pixels, share = with_refined(photo, pixels, document.refined)
-    changed, outside = _count_changes(photo, pixels, footprint)
+    changed, outside = _count_changes((photo, alpha), (pixels, blend.alpha), footprint)
     from_photo, from_lifter, from_inpainter, paint = ((1 - share) * own for own in blend.shares())
     shares = Shares(from_photo, from_lifter, from_inpainter, share, paint)
     weights = blend.weights
     return Composite(
         pixels, footprint, changed, outside, shares, camera, things, drawing.box, weights,
-        blend.beside,
+        blend.beside, blend.alpha,
     )  # fmt: skip
 
 
@@ -216,11 +226,18 @@ class _Drawing:
         for top in range(y0, y1, rows):
             yield top, min(top + rows, y1)
 
-    def over_plate(self, photo: Pixels, top: int, bottom: int) -> list[Rows]:
-        """The edit on the rows `top`..`bottom` of the box, a piece for each thread."""
+    def over_plate(
+        self, photo: Pixels, behind: np.ndarray | None, top: int, bottom: int
+    ) -> list[Rows]:
+        """The edit on the rows `top`..`bottom` of the box, a piece for each thread.
+
+        `behind` (H, W): the alpha of what lies behind the objects; None: the photo has none.
+        """
         x0, y0, x1, y1 = self.box
         pieces = [(x0, a, x1, b) for a, b in _pieces(top, bottom)]
         rows = map_in_threads(partial(_plate_rows, photo, self._plate), pieces)
+        if behind is not None:
+            rows = map_in_threads(partial(_as_opaque, behind), rows)
         for shade in self._shades:
             rows = map_in_threads(partial(_shaded, shade), rows)
         # `displacement` looks around each pixel. A whole row of tiles more above, and the tiles
@@ -324,15 +341,22 @@ def _plate_rows(photo: Pixels, plate: Plate | None, box: Box) -> Rows:
     return Rows(x0, y0, colour, 1 - invented, nothing, invented, nothing, nothing > 0, touched)
 
 
+def _as_opaque(alpha: np.ndarray, rows: Rows) -> Rows:
+    """`rows` no more opaque than `alpha` (H, W) is there."""
+    x0, y0, x1, y1 = rows.box
+    cover = unit_pixels(alpha[y0:y1, x0:x1])
+    return replace(rows, colour=rows.colour * cover[..., None], cover=cover)
+
+
 def _shaded(shade: Shade, rows: Rows) -> Rows:
-    """`rows` under a shadow."""
+    """`rows` under a shadow, which also falls on clear ground."""
     there = shade.at(rows.box)
     if not there.any():
         return rows
     ink = np.array(shade.colour, np.float32)
     colour = rows.colour + there[..., None] * (ink - rows.colour)
     touched = there if rows.touched is None else np.maximum(rows.touched, there)
-    return replace(rows, colour=colour, touched=touched)
+    return replace(rows, colour=colour, touched=touched, cover=rows.cover_under(there))
 
 
 def _without(matte: Matte, rows: Rows) -> Rows:
@@ -362,6 +386,7 @@ def _at_rest(thing: Moved, rows: Rows) -> Rows:
         moved=np.where(alpha >= OPAQUE, np.float32(0), rows.moved),
         touched=touched,
         from_paint=None if rows.from_paint is None else through * rows.from_paint,
+        cover=rows.cover_under(alpha),
     )
 
 
@@ -400,7 +425,7 @@ def _with(thing: Moved, drawn: Picture3D, above: int, paint: F32 | None, rows: R
         from_paint = own if from_paint is None else own + from_paint
     return replace(
         rows,
-        colour=mixed(rows.colour, picture.color, picture.alpha, thing.look.mode),
+        colour=_mixed_over(rows, picture, thing.look.mode),
         from_photo=from_photo + through * rows.from_photo,
         from_lifter=from_lifter + through * rows.from_lifter,
         from_inpainter=through * rows.from_inpainter,
@@ -408,18 +433,32 @@ def _with(thing: Moved, drawn: Picture3D, above: int, paint: F32 | None, rows: R
         is_covered=rows.is_covered | (rest[inner] > 0) | (picture.alpha > 0),
         touched=touched,
         from_paint=from_paint,
+        cover=rows.cover_under(picture.alpha),
     )
 
 
-def _count_changes(photo: Pixels, pixels: Pixels, footprint: Mask) -> tuple[int, int]:
-    """How many pixels differ, in all and outside the footprint."""
+def _mixed_over(rows: Rows, picture: Picture3D, mode: str) -> F32:
+    """The colours of `rows` (h, w, 3) under an object's `picture`."""
+    if rows.cover is None or mode == NORMAL:
+        return mixed(rows.colour, picture.color, picture.alpha, mode)
+    below = np.dstack([rows.colour, rows.cover])
+    return over(below, np.dstack([picture.color, picture.alpha]), mode)[..., :3]
+
+
+def _count_changes(
+    photo: tuple[Pixels, np.ndarray | None], result: tuple[Pixels, np.ndarray | None],
+    footprint: Mask,
+) -> tuple[int, int]:  # fmt: skip
+    """How many pixels differ, in colour or alpha, in all and outside the footprint."""
 
     def count(rows: tuple[int, int]) -> tuple[int, int]:
         part = slice(*rows)
-        is_changed = differ(pixels[part], photo[part])
+        is_changed = differ(result[0][part], photo[0][part])
+        if photo[1] is not None and result[1] is not None:
+            is_changed |= result[1][part] != photo[1][part]
         return int(is_changed.sum()), int((is_changed & ~footprint[part]).sum())
 
-    counts = map_in_threads(count, _pieces(0, len(photo)))
+    counts = map_in_threads(count, _pieces(0, len(footprint)))
     return sum(changed for changed, _ in counts), sum(outside for _, outside in counts)
 
 

@@ -143,7 +143,11 @@ def _trimmed(name: str, pixels: np.ndarray, box: Box) -> list[Layer]:
 
 
 def _untouched(document: Document, result: Composite, pile: list[Layer]) -> list[Layer]:
-    """The photo over all that is drawn, as far as the edit does not show there."""
+    """The photo over all that is drawn, as far as the edit does not show there.
+
+    Where the result is not opaque, it is there itself: the layers below are over the photo's
+    colours under clear ground, and not over nothing.
+    """
     if not pile:
         return []
     width, height = document.photo.size
@@ -157,5 +161,9 @@ def _untouched(document: Document, result: Composite, pile: list[Layer]) -> list
         alpha[y0:y1, x0:x1] -= result.weights
     alpha[~drawn] = 0
     photo = document.photo.pixels
+    if result.alpha is not None:  # under the mask of the pile, what is soft has its own colour
+        soft = drawn & (result.alpha < np.iinfo(photo.dtype).max)
+        alpha[soft] = 1
+        photo = np.where(soft[..., None], result.pixels, photo)
     samples = np.dstack([photo, pixels_from_unit(alpha, photo.dtype)])
     return _trimmed(UNTOUCHED, samples, (0, 0, width, height))

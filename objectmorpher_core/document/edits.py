@@ -37,6 +37,7 @@ from .settings import (
     Shadow,
     Share,
 )
+from .transparency import with_opacity, within
 
 SAME_THING = 0.15  # IoU of two masks, below which they are of two things
 COPY = re.compile(r" copy( \d+)?$")  # at the end of a copy's name
@@ -129,7 +130,7 @@ def is_refinement(item: EditObject, selection: Selection | None) -> bool:
 def _with_mask(
     document: Document, k: int, mask: Selection | None, prompt: Prompt, found: Mask | None = None
 ) -> Document:
-    item = document.objects[k]
+    item, mask = document.objects[k], within(mask, document.photo.picture)
     is_refined = is_refinement(item, mask)
     if mask is None or not is_refined:
         changed = item.with_mask(mask, prompt, found)
@@ -166,6 +167,7 @@ def refit(
     from ..lift.refitting import refitted
 
     item, photo = document.objects[k], document.photo
+    matte = with_opacity(matte, photo.picture, item.mask)
     fitted = (
         refitted(each, matte, lifted, photo.camera) if _is_copy(each, item) else each
         for each in document.objects
@@ -179,6 +181,7 @@ def set_lifted(
     shape: LiftSettings | None = None,
 ) -> Document:  # fmt: skip
     """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
+    matte = with_opacity(matte, document.photo.picture, document.objects[k].mask)
     item = decontaminated(document.photo, document.objects[k].with_lifted(matte, lifted, shape))
     return document.with_object(k, item).with_backend("lift", lifted.backend)
 
@@ -189,6 +192,7 @@ def reshape(
     """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
     from ..lift.refitting import carried_over
 
+    matte = with_opacity(matte, document.photo.picture, document.objects[k].mask)
     item = carried_over(document.objects[k], matte, lifted, shape)
     changed = decontaminated(document.photo, item)
     return document.with_object(k, changed).with_backend("lift", lifted.backend)
@@ -489,7 +493,11 @@ def keep_in_front(document: Document, k: int, matte: Matte | None = None) -> Doc
         raise EditError("nothing is selected that could stay in front")
     if item.is_moved:
         raise EditError("what was moved cannot stay where it is")
-    kept = replace(item, matte=matte or item.found_matte, contaminated=None, stays_in_front=True)
+    if matte is None:
+        matte = item.found_matte
+    else:
+        matte = with_opacity(matte, document.photo.picture, item.mask)
+    kept = replace(item, matte=matte, contaminated=None, stays_in_front=True)
     return document.with_object(k, kept)
 
 

@@ -110,7 +110,7 @@ class Picture:
     """Upright RGB pixels and everything of the file that must survive the edit."""
 
     pixels: Pixels  # (H, W, 3) u8 or u16, RGB
-    alpha: np.ndarray | None = None  # (H, W) same dtype, kept aside and never edited
+    alpha: np.ndarray | None = None  # (H, W) same dtype, straight
     is_grey: bool = False  # the file had one colour channel; so will the export
     icc: bytes | None = None  # colour profile
     exif: bytes | None = None  # raw EXIF block (a TIFF header first), orientation 1 (upright)

@@ -69,11 +69,11 @@ def _opened(path: Path) -> cv2.VideoCapture:
     return video
 
 
-def encode_video(frames: Iterable[RGB], rate: float, ending: str, alpha: U8 | None = None) -> bytes:
-    """The file of `frames` (h, w, 3), all of one size, shown `rate` a second, for ever.
+def encode_video(frames: Iterable[U8], rate: float, ending: str) -> bytes:
+    """The file of `frames` (h, w, 3 or 4), all of one size, shown `rate` a second, for ever.
 
-    `alpha` (h, w) of all of them: WebP keeps it, GIF whether a pixel is there; films have none,
-    and an even number of rows and columns: the last one is left out.
+    Of their alpha WebP keeps all, GIF whether a pixel is there; films have none, and an even
+    number of rows and columns: the last one is left out.
 
     Raises VideoError for an unknown ending, no frames, and where the encoder is not there.
     """
@@ -87,10 +87,10 @@ def encode_video(frames: Iterable[RGB], rate: float, ending: str, alpha: U8 | No
     everything = chain([first], coming)
     if ending in CODECS:
         return _filmed(everything, first.shape, rate, ending)
-    return _pictured(everything, rate, ending, alpha)
+    return _pictured(everything, rate, ending, first.shape[2] == 4)
 
 
-def _filmed(frames: Iterable[RGB], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
+def _filmed(frames: Iterable[U8], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:  # OpenCV writes to names only
         path, count = Path(folder) / f"video{ending}", 0
         height, width = (side - side % 2 for side in shape[:2])  # colours have half of them
@@ -100,7 +100,7 @@ def _filmed(frames: Iterable[RGB], shape: tuple[int, ...], rate: float, ending: 
             if not writer.isOpened():
                 raise VideoError(f"OpenCV has no encoder for {ending} here; choose .webp or .gif")
             for frame in frames:
-                writer.write(cv2.cvtColor(frame[:height, :width], cv2.COLOR_RGB2BGR))
+                writer.write(cv2.cvtColor(frame[:height, :width, :3], cv2.COLOR_RGB2BGR))
                 count += 1
             writer.release()
         if _frames_in(path) != count:  # the encoder itself says nothing of what fails
@@ -122,18 +122,17 @@ def _frames_in(path: Path) -> int:
     return count
 
 
-def _pictured(frames: Iterable[RGB], rate: float, ending: str, alpha: U8 | None) -> bytes:
+def _pictured(frames: Iterable[U8], rate: float, ending: str, has_alpha: bool) -> bytes:
     out = io.BytesIO()
     if ending == ".webp":
-        seen = frames if alpha is None else (np.dstack([frame, alpha]) for frame in frames)
-        images: Iterator[Image.Image] = map(Image.fromarray, seen)
+        images: Iterator[Image.Image] = map(Image.fromarray, frames)
         first = next(images)
         first.save(out, "WEBP", save_all=True, append_images=images, loop=0,
                    duration=_lasting(rate, 1), quality=WEBP_QUALITY, method=2)  # fmt: skip
         return out.getvalue()
-    images = map(_palettes(alpha), frames)
+    images = map(_palettes(has_alpha), frames)
     first = next(images)
-    clear = {} if alpha is None else {"transparency": CLEAR, "disposal": 2}
+    clear = {"transparency": CLEAR, "disposal": 2} if has_alpha else {}
     first.save(
         out, "GIF", save_all=True, append_images=images, loop=0,
         duration=_lasting(rate, GIF_TICK), **clear,
@@ -150,19 +149,27 @@ def _lasting(rate: float, tick: int) -> list[int]:
     return [int(tick * max(ticks, 2 if tick > 1 else 1)) for ticks in np.diff(ends)]
 
 
-def _palettes(alpha: U8 | None) -> Callable[[RGB], Image.Image]:
+def _below_half(level: int) -> int:
+    return 255 if level < 128 else 0
+
+
+def _palettes(has_alpha: bool) -> Callable[[U8], Image.Image]:
     """Makes pictures of 256 colours, which are the first frame's for all: nothing flickers."""
     palette: list[Image.Image] = []
-    is_clear = None if alpha is None else at_most(alpha, GIF_LONGEST) < 128
-    count = 256 if alpha is None else CLEAR
+    count = CLEAR if has_alpha else 256
 
-    def reduced(frame: RGB) -> Image.Image:
-        image = Image.fromarray(at_most(frame, GIF_LONGEST))
+    def reduced(frame: U8) -> Image.Image:
+        if has_alpha:  # which Pillow heeds when it makes a picture smaller
+            image = Image.fromarray(frame)
+            image.thumbnail((GIF_LONGEST, GIF_LONGEST), Image.Resampling.BOX)
+            is_clear, image = image.getchannel("A").point(_below_half), image.convert("RGB")
+        else:
+            is_clear, image = None, Image.fromarray(at_most(frame, GIF_LONGEST))
         if not palette:
             palette.append(image.quantize(count, Image.Quantize.MEDIANCUT))
         made = image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)
         if is_clear is not None:
-            made.paste(CLEAR, mask=Image.fromarray(is_clear))
+            made.paste(CLEAR, mask=is_clear)
         return made
 
     return reduced

@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, RGB, U8, Mask, crop, pixels_from_unit, unit_pixels
+from ..base.arrays import F32, U8, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ..base.camera import Camera
 from ..base.progress import Progress, silent
 from ..base.rotations import Gimbal, matrix_from_vector, vector_from_matrix
@@ -47,10 +47,7 @@ def shrunk(document: Document, times: int) -> Document:
     photo = document.photo
     camera = _camera(photo.camera, times, width, height)
     pixels = photo.pixels[: height * times, : width * times]
-    picture = replace(
-        photo.picture, pixels=pixels_from_unit(_means(unit_pixels(pixels), times), pixels.dtype),
-        alpha=None,
-    )  # fmt: skip
+    picture = replace(photo.picture, **_smaller(pixels, photo.picture.alpha, times))
     return replace(
         document,
         photo=Photo(picture, camera, photo.source, photo.name),
@@ -59,6 +56,22 @@ def shrunk(document: Document, times: int) -> Document:
         refined=None if document.refined is None else _refined(document.refined, times, camera),
         horizon=None if document.horizon is None else document.horizon / times,
     )
+
+
+def _smaller(
+    pixels: Pixels, alpha: np.ndarray | None, times: int
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """`pixels` (H, W, 3) and straight `alpha`, if there is one, `times` smaller."""
+    height, width = pixels.shape[:2]
+    if alpha is None:
+        return {"pixels": pixels_from_unit(_means(unit_pixels(pixels), times), pixels.dtype)}
+    cover = unit_pixels(alpha[:height, :width])
+    share = _means(cover, times)
+    own = _means(unit_pixels(pixels) * cover[..., None], times) / np.maximum(share, 1e-6)[..., None]
+    return {
+        "pixels": pixels_from_unit(own, pixels.dtype),
+        "alpha": pixels_from_unit(share, alpha.dtype),
+    }
 
 
 def _camera(camera: Camera, times: int, width: int, height: int) -> Camera:
@@ -207,8 +220,10 @@ class Clip:
         return max(round(self.seconds * self.rate), 1)
 
 
-def frames(document: Document, clip: Clip, progress: Progress = silent) -> Iterator[RGB]:
-    """The clip's pictures (h, w, 3), all of one size.
+def frames(document: Document, clip: Clip, progress: Progress = silent) -> Iterator[U8]:
+    """The clip's pictures (h, w, 3), or (h, w, 4) where the photo has an alpha channel.
+
+    All are of one size.
 
     Played again and again the clip has no jump. Raises ValueError where nothing moves.
     """
@@ -235,17 +250,6 @@ def frames(document: Document, clip: Clip, progress: Progress = silent) -> Itera
         else:
             pixels = film.drawn(film.turned(turning or 0, _yaw_at(time, clip.motion)))
         yield np.ascontiguousarray(pixels)
-
-
-def frames_alpha(document: Document, clip: Clip) -> U8 | None:
-    """(h, w) the photo's alpha channel for each of the clip's pictures; None where it has none."""
-    alpha = document.photo.picture.alpha
-    if alpha is None:
-        return None
-    levels = np.asarray(to_u8(alpha), np.float32)
-    times = _times(document, clip)
-    height, width = (side // times * times for side in levels.shape)
-    return np.rint(_means(levels[:height, :width], times)).astype(np.uint8)
 
 
 def _times(document: Document, clip: Clip) -> int:
@@ -306,11 +310,13 @@ class _Film:
         }
         self._last: dict[int, Pose] = {}  # of each object, to go on from
 
-    def drawn(self, document: Document) -> RGB:
+    def drawn(self, document: Document) -> U8:
         """The composite of the document at some moment."""
-        return to_u8(composite(document, self.puppets).pixels)
+        result = composite(document, self.puppets)
+        pixels = to_u8(result.pixels)
+        return pixels if result.alpha is None else np.dstack([pixels, to_u8(result.alpha)])
 
-    def morph(self, time: float) -> RGB:
+    def morph(self, time: float) -> U8:
         """The picture at a `time` in [0, 1) of the way from the photo to the edit and back.
 
         Objects move; what else the edit changes is faded in: their look, shadows old and new, and
@@ -325,8 +331,7 @@ class _Film:
         is_alike = all(a is b for a, b in zip(objects, moved.objects, strict=True))
         if (is_alike and plain.plate is moved.plate) or share <= 0:
             return self.drawn(plain)
-        before, after = (self.drawn(document).astype(np.float32) for document in (plain, moved))
-        return np.rint(before + share * (after - before)).astype(np.uint8)
+        return _faded(self.drawn(plain), self.drawn(moved), share)
 
     def _refined(self, share: float) -> Document:
         """The document with so much of its refinement."""
@@ -403,6 +408,18 @@ class _Film:
         solved = deformer.solve(handles, end.footing, self._last.get(k), tolerance=TOLERANCE)
         self._last[k] = solved.pose
         return solved.pose
+
+
+def _faded(before: U8, after: U8, share: float) -> U8:
+    """A `share` of the way from one picture (h, w, 3 or 4) to another one."""
+    one, two = before.astype(np.float32), after.astype(np.float32)
+    if before.shape[2] == 4:  # what is clear has no colour
+        for straight in (one, two):
+            straight[..., :3] *= straight[..., 3:] / 255
+    mixed = one + share * (two - one)
+    if before.shape[2] == 4:
+        mixed[..., :3] *= 255 / np.maximum(mixed[..., 3:], 1e-3)
+    return np.rint(mixed.clip(0, 255)).astype(np.uint8)
 
 
 def _at_rest(item: EditObject) -> EditObject:

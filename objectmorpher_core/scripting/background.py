@@ -76,7 +76,7 @@ class PlateTask:
         """Whether the other one finds the same to the bit."""
         mine = self.hints, self.inpaint, self.seed, len(self.casters)
         return (
-            self.pixels is other.pixels
+            (self.pixels is other.pixels or np.array_equal(self.pixels, other.pixels))
             and mine == (other.hints, other.inpaint, other.seed, len(other.casters))
             and np.array_equal(self.covered, other.covered)
             and all(a.is_like(b) for a, b in zip(self.casters, other.casters, strict=True))

@@ -9,23 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.arrays import F32, RGB, crop, pixels_from_unit
+from ..base.arrays import F32, U8, crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
 from ..base.quoting import shown
 from ..compose.composite import Composite, composite, object_texture, straight_cutout
 from ..compose.layers import Layer, layers
-from ..compose.plate.plate import overlap, plate_picture
+from ..compose.plate.plate import overlap, plate_alpha, plate_picture
 from ..deform.puppet import Puppet, puppet_of
 from ..document.model import Document, EditObject
 from ..pictures.formats import NEED_PLATE, WRITTEN, Format, endings_of, format_of
-from ..pictures.image import LOSSLESS, Picture, encode_picture, to_u8
+from ..pictures.image import LOSSLESS, Picture, encode_array, encode_picture, to_u8
 from ..pictures.openraster import encode_openraster
 from ..pictures.psd import encode_psd
 from ..pictures.video import encode_video
 from ..pipeline import Edited, export
 from ..raster import tiles
 from ..splat_files import encode as encode_splats
-from .animation import Clip, frames, frames_alpha
+from .animation import Clip, frames
 from .options import ScriptError
 
 # The distance of the lifted objects as a picture for other programs.
@@ -133,8 +133,7 @@ class Export:
             write = encode_psd if format_of(path.name) is Format.PSD else encode_openraster
             return write(pile, merged)
         if what == "video":
-            alpha = frames_alpha(self.document, self.clip)
-            return encode_video(self._film(), self.clip.rate, path.suffix, alpha)
+            return encode_video(self._film(), self.clip.rate, path.suffix)
         if what in ("splats", "mesh"):
             return self._solid(what, path)
         return self._encoded(self.picture(what), path.suffix)
@@ -152,9 +151,9 @@ class Export:
             return depth_picture(self.document, self.edited and self.edited.puppets, draw)
         photo = self.document.photo
         pixels = photo.pixels if self.document.plate is None else plate_picture(self.document)
-        return replace(photo.picture, pixels=pixels)
+        return replace(photo.picture, pixels=pixels, alpha=plate_alpha(self.document))
 
-    def _film(self) -> Iterator[RGB]:
+    def _film(self) -> Iterator[U8]:
         return frames(self.document, self.clip, part(self.progress, 0.02, 0.95))
 
     def files(self, what: str, folder: Path) -> dict[Path, bytes]:
@@ -164,11 +163,11 @@ class Export:
         """
         if what == "layers":
             return self._layer_files(folder)
-        stem, alpha = Path(self.document.photo.name).stem, frames_alpha(self.document, self.clip)
+        stem = Path(self.document.photo.name).stem
         if (old := _frames_beyond(folder, stem, self.clip.count)) is not None:
             raise ScriptError(f"{old} is of a longer video; choose another folder, or empty it")
         return {
-            folder / f"{stem}-{n:04d}.png": encode_picture(Picture(frame, alpha), ".png")
+            folder / f"{stem}-{n:04d}.png": encode_array(frame)
             for n, frame in enumerate(self._film())
         }
 
@@ -195,7 +194,7 @@ class Export:
     def layers(self, progress: Progress) -> tuple[Picture, list[Layer]]:
         """Return the edited photo and its layers from below, with the bits that are wanted."""
         result, pile = layers(self.document, progress)
-        merged = replace(self.document.photo.picture, pixels=result.pixels)
+        merged = result.picture(self.document.photo.picture)
         deep = [replace(layer, pixels=_sampled(layer.pixels, self.bits)) for layer in pile]
         return self._with_bits(merged), deep
 
@@ -258,8 +257,9 @@ def unmoved_cutout(document: Document, thing: EditObject) -> np.ndarray:
     height, width = pixels.shape[:2]
     if thing.matte is None:
         assert thing.mask is not None, "it is asked for first"
-        alpha = thing.mask * np.array(np.iinfo(pixels.dtype).max, pixels.dtype)
-        return np.dstack([pixels, alpha])
+        own = document.photo.picture.alpha
+        most = np.array(np.iinfo(pixels.dtype).max, pixels.dtype)
+        return np.dstack([pixels, thing.mask * (most if own is None else own)])
     matte = thing.matte
     box = (max(matte.left, 0), max(matte.top, 0), min(matte.box[2], width),
            min(matte.box[3], height))  # fmt: skip

@@ -33,6 +33,7 @@ from ..document.model import (
 )
 from ..document.placement import is_in_place, set_seen_from, spun
 from ..document.settings import DeformSettings, Hint, Shadow
+from ..document.transparency import continued, with_opacity
 from ..pictures.image import naming, read_mask
 from ..raster.trust import SIGNS, trust_in
 from .background import LIGHT, LIGHT_LIFTERS, PlateAhead, PlateTask, ShadowCaster
@@ -359,8 +360,9 @@ def plate_task(document: Document, script: EditScript, casting: frozenset[int]) 
     for matte in _distinct(document, casting):
         has_gone = not any(o.matte is matte and not has_left(o, document) for o in document.objects)
         casters.append(ShadowCaster(matte, has_gone))
+    covered = plate_cover(document)
     return PlateTask(
-        document.photo.pixels, plate_cover(document), tuple(casters), document.hints,
+        continued(document.photo.picture, covered), covered, tuple(casters), document.hints,
         script.inpaint, script.seed,
     )  # fmt: skip
 
@@ -380,6 +382,7 @@ def begun_plate(
         return None
     if not is_light:
         return None
+    matte = with_opacity(matte, document.photo.picture, document.objects[k].mask)
     item = replace(document.objects[k], matte=matte, is_visible=not script.remove)
     item = replace(item, placement=_placement(script))
     document = edits.set_hints(document, _hints(script, document.photo.size))

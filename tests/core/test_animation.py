@@ -39,7 +39,6 @@ from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.scripting.animation import (
     Clip,
     frames,
-    frames_alpha,
     share_at,
     shrunk,
     station_at,
@@ -424,7 +423,7 @@ def test_what_the_photo_does_not_show_is_in_no_frame(ending: str):
     sent, clear = drifting(4), np.s_[:30, :40]
     alpha = np.full(sent[0].shape[:2], 255, np.uint8)
     alpha[clear] = 0
-    data = encode_video(iter(sent), 20.0, ending, alpha)
+    data = encode_video((np.dstack([frame, alpha]) for frame in sent), 20.0, ending)
     with Image.open(io.BytesIO(data)) as image:
         assert image.n_frames == len(sent)
         for frame, before in zip(ImageSequence.Iterator(image), sent, strict=True):
@@ -434,7 +433,7 @@ def test_what_the_photo_does_not_show_is_in_no_frame(ending: str):
             assert np.abs(found[there][:, :3].astype(int) - before[there]).mean() < 8
 
 
-def test_the_alpha_of_a_clip_is_the_photos_as_small_as_its_frames():
+def test_the_alpha_of_a_clip_at_rest_is_the_photos_as_small_as_its_frames():
     document = edited()
     height, width = document.photo.pixels.shape[:2]
     alpha = np.zeros((height, width), np.uint8)
@@ -442,7 +441,7 @@ def test_the_alpha_of_a_clip_is_the_photos_as_small_as_its_frames():
     photo = replace(document.photo, picture=replace(document.photo.picture, alpha=alpha))
     document = replace(document, photo=photo)
     clip = Clip(seconds=0.2, longest=(max(width, height) + 1) // 2)
-    (first, *_), small = list(frames(document, clip)), frames_alpha(document, clip)
-    assert small is not None and small.shape == first.shape[:2] == (height // 2, width // 2)
-    assert set(np.unique(small)) == {0, 255}
-    assert frames_alpha(edited(), clip) is None
+    small = next(frames(document, clip))
+    assert small.shape == (height // 2, width // 2, 4)
+    assert set(np.unique(small[..., 3])) == {0, 255}
+    assert next(frames(edited(), clip)).shape[2] == 3

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Sparse, crop
+from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Pixels, Sparse, crop
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import (
@@ -87,6 +87,7 @@ class Derived:
         self._ghosts, self._standing = Memo(), Memo()
         # The last background that was shown, and for which masks it was made
         self._filled: tuple[tuple[Mask, ...], Plate] | None = None
+        self._seen, self._bare = Memo(2), Memo(2)
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -119,6 +120,7 @@ class Derived:
         from objectmorpher_core.compose.order import holes
         from objectmorpher_core.compose.plate.plate import plate_of_holes, shaded, shaded_plate
         from objectmorpher_core.compose.plate.residue import shown_shares
+        from objectmorpher_core.document.transparency import seen_plate
 
         gone, ghosts = holes(document), self.ghosts(document)
         shares = _the_same(shown_shares(document, ghosts, gone))
@@ -126,10 +128,28 @@ class Derived:
             lambda: shaded_plate(document, gone, ghosts),
             document.plate, ghosts, *gone, *shaded(document, gone),
         )  # fmt: skip
-        return self._plates(
-            lambda: plate_of_holes(document, gone, ghosts, base), base,
-            *gone, *(o.mask for o in document.objects), shares,
+
+        def build() -> Plate | None:
+            plate = plate_of_holes(document, gone, ghosts, base)
+            return seen_plate(document.photo, plate, gone)
+
+        return self._plates(build, base, *gone, *(o.mask for o in document.objects), shares)
+
+    def bare_plate(self, document: Document) -> Plate | None:
+        """Return the background of the view without any object."""
+        from objectmorpher_core.document.transparency import seen_plate
+
+        mattes = tuple(o.matte_here for o in document.objects if o.matte_here is not None)
+        return self._bare(
+            lambda: seen_plate(document.photo, document.plate, mattes),
+            document.photo, document.plate, *mattes,
         )  # fmt: skip
+
+    def photo(self, photo: Photo) -> Pixels:
+        """(H, W, 3) the photo of the view: on a checker where it is transparent."""
+        from objectmorpher_core.document.transparency import seen
+
+        return self._seen(lambda: seen(photo), photo)
 
     def ghosts(self, document: Document) -> tuple[Ghost, ...]:
         """What the objects leave beside their cut-outs."""

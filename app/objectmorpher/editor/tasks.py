@@ -381,8 +381,9 @@ class Tasks:
 
     def _ask_plate(self, document: Document, wanted: Wanted) -> None:
         from objectmorpher_core.compose.plate.plate import plate_cover
+        from objectmorpher_core.document.transparency import continued
 
-        editor = self._editor
+        editor, covered = self._editor, plate_cover(document)
 
         def accept(plate: Plate) -> None:
             self._plate = (wanted, plate)
@@ -403,8 +404,8 @@ class Tasks:
             editor.complain_of(replace(error, retry=retry))
 
         editor.jobs.start(
-            t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
-            plate_cover(document),
+            t("Filling in the background"), job_functions.inpaint,
+            continued(document.photo.picture, covered), covered,
             BackendChoice(editor.settings.backends.inpaint, document.seed, document.hints),
             done=accept, failed=fail, cancelled=say_so, replaced=forget, kind=PLATE,
         )  # fmt: skip

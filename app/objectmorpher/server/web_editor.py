@@ -44,6 +44,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Click, Document, Pose, Prompt
 from objectmorpher_core.document.placement import placement_of
+from objectmorpher_core.document.transparency import seen
 from objectmorpher_core.pictures.image import (
     Picture,
     at_most,
@@ -155,7 +156,7 @@ class WebEdit:
     def show(self, what: str) -> tuple[bytes, str]:
         """The bytes of "photo", "mask", "page" or a file, and their media type."""
         if what == "photo":
-            pixels = at_most(to_u8(self.opened.photo.pixels), LONGEST)
+            pixels = at_most(to_u8(seen(self.opened.photo)), LONGEST)
             return encode_picture(Picture(pixels), ".webp", webp_quality=QUALITY), "image/webp"
         if what == "mask":
             mask = self._chosen().objects[0].mask

@@ -18,6 +18,7 @@ from ...base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixel
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint
+from ...document.transparency import alpha_behind
 from .. import Inpainter, InpaintError, LooksFar, TakesHints
 from ..blend import Box, distance
 from .residue import (
@@ -332,6 +333,19 @@ def plate_picture(document: Document) -> Pixels:
             behind = cut(result, (0, 0, width, height), box)
             mixed = alpha * cut(own.foreground, own.box, box) + (1 - alpha) * unit_pixels(behind)
             np.copyto(behind, pixels_from_unit(mixed, photo.dtype), where=is_invented)
+    return result
+
+
+def plate_alpha(document: Document) -> np.ndarray | None:
+    """(H, W) the alpha of the `plate_picture`; None where the photo has none."""
+    plate, alpha, size = document.plate, document.photo.picture.alpha, document.photo.size
+    if plate is None or alpha is None:
+        return alpha
+    there = [(o.matte_here, o.stays_in_front) for o in document.objects]
+    result = alpha_behind(alpha, plate, tuple(m for m, stays in there if m and not stays)).copy()
+    for matte in (m for m, stays in there if m and stays):
+        own = crop(matte.alpha, matte.box, (0, 0, *size))
+        np.maximum(result, pixels_from_unit(own, alpha.dtype), out=result)
     return result
 
 

@@ -15,9 +15,9 @@ from ... import models
 from ...base.arrays import F32, RGB, Mask, Pixels
 from ...base.masks import box_of
 from ...models.depth_net import DepthNet
+from ...models.onnx_session import Looks
 from ...pictures.image import to_u8
 from .. import LiftError
-from ..looks import Looks
 from .depth_prior import NetworkDepth
 
 Look = Callable[[Pixels, Mask], NetworkDepth | None]

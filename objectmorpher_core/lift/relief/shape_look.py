@@ -17,10 +17,9 @@ from ... import models
 from ...base.arrays import F32, RGB, Mask, Pixels
 from ...base.camera import Camera
 from ...models import registry
-from ...models.onnx_session import open_session
+from ...models.onnx_session import Looks, open_session
 from ...segment import dino_tokens
 from ..crop import Crop, planes_of
-from ..looks import Looks
 
 NO_EDGE = -12.0  # logit
 NORMAL, SIDEWAYS = slice(3, 6), 3  # of what the network says: the normals, and their x

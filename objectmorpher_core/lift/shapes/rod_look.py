@@ -14,11 +14,10 @@ import numpy as np
 from ... import models
 from ...base.arrays import F32, RGB, Mask, Pixels
 from ...models import registry
-from ...models.onnx_session import open_session
+from ...models.onnx_session import Looks, open_session
 from ...segment import dino_tokens
 from ...segment.dino_tokens import PATCH
 from ..crop import SIDE
-from ..looks import Looks
 from .rods import RodView
 
 GRID = SIDE // PATCH  # tokens on a side

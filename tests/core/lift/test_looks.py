@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from objectmorpher_core.lift.looks import Looks
+from objectmorpher_core.models.onnx_session import Looks
 
 
 def test_what_was_seen_is_looked_at_once() -> None:

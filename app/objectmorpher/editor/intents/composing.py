@@ -14,6 +14,7 @@ from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
 from objectmorpher_core.document.settings import Finish, Hint, Shadow, Share
+from objectmorpher_core.document.transparency import continued
 
 from ...canvas.layer import CanvasLayer
 from ...canvas.memo import same
@@ -118,7 +119,7 @@ class Composing:
     ) -> None:
         editor, document = self._editor, self._editor.document
         assert document is not None
-        masks = masks_of(document)
+        masks, covered = masks_of(document), editor.derived.hidden(document)
 
         def take(plate: Plate) -> None:
             end()
@@ -132,8 +133,9 @@ class Composing:
             editor.complain_of(error)
 
         editor.jobs.start(
-            t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
-            editor.derived.hidden(document), BackendChoice(self.inpainter, seed, hints),
+            t("Filling in the background"), job_functions.inpaint,
+            continued(document.photo.picture, covered), covered,
+            BackendChoice(self.inpainter, seed, hints),
             done=accept, failed=fail, cancelled=end, replaced=end, kind=PLATE,
         )  # fmt: skip
 
@@ -142,14 +144,15 @@ class Composing:
         editor, document = self._editor, self._editor.document
         if document is None or document.plate is None:
             return
-        masks = masks_of(document)
+        masks, covered = masks_of(document), editor.derived.hidden(document)
 
         def accept(variants: tuple[Variant, ...]) -> None:
             self._variants = (masks, variants)
 
         editor.jobs.start(
-            t("Filling in the background"), job_functions.fill_variants, document.photo.pixels,
-            editor.derived.hidden(document), self.choice(document.plate.seed + 1), COUNT,
+            t("Filling in the background"), job_functions.fill_variants,
+            continued(document.photo.picture, covered), covered,
+            self.choice(document.plate.seed + 1), COUNT,
             done=accept, failed=editor.complain_of, kind=VARIANTS,
         )  # fmt: skip
 

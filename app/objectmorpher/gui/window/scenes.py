@@ -28,7 +28,7 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     document, view = editor.looking.document, editor.view
     if document is None:
         return None
-    photo, surround = document.photo.pixels, theme.rgb("surround")
+    photo, surround = editor.derived.photo(document.photo), theme.rgb("surround")
     shown = shown_now(document, view)
     if view.tool is ToolName.COMPOSE and view.compose.is_bare and not view.is_before:
         return _bare_scene(editor, document)
@@ -68,7 +68,7 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
 
 def _bare(editor: Editor, document: Document, renderer: str, shown: Shown) -> Scene:
     """Objects without the photo, on a checker or on plain paper."""
-    photo, surround = document.photo.pixels, theme.rgb("surround")
+    photo, surround = editor.derived.photo(document.photo), theme.rgb("surround")
     frame = build_frame(document, editor.view, editor.cache, shown, renderer)
     objects = splat_objects(document, frame) if renderer == "gl" else ()
     layers = () if renderer == "gl" else frame.layers
@@ -93,7 +93,8 @@ def _selecting(editor: Editor, document: Document) -> Scene:
     strength = PAINTED_VEIL if is_painted else VEIL
     tint = editor.shaping.painted_layer() if is_painted else None
     return Scene(
-        document.photo.pixels, theme.rgb("surround"), layers=() if tint is None else (tint,),
+        editor.derived.photo(document.photo), theme.rgb("surround"),
+        layers=() if tint is None else (tint,),
         mask=selection,
         touched=tuple(painting.touched) if painting else (), veil=strength if is_veiled else 0.0,
     )  # fmt: skip
@@ -101,7 +102,8 @@ def _selecting(editor: Editor, document: Document) -> Scene:
 
 def _bare_scene(editor: Editor, document: Document) -> Scene:
     """The background alone, and what of it is being repaired."""
-    photo, surround, split = document.photo.pixels, theme.rgb("surround"), editor.view.split or 0.0
+    photo, surround = editor.derived.photo(document.photo), theme.rgb("surround")
+    plate, split = editor.derived.bare_plate(document), editor.view.split or 0.0
     mask = editor.derived.hidden(document) if document.plate is None else None
     fronts = [
         editor.cache.fronts.layer(item, editor.view)
@@ -111,7 +113,7 @@ def _bare_scene(editor: Editor, document: Document) -> Scene:
     found = (*fronts, editor.composing.painted_layer())
     layers = tuple(layer for layer in found if layer is not None)
     hatch = None if mask is None else MISSING
-    return Scene(photo, surround, document.plate, (), layers, (), mask, hatch=hatch, split=split)
+    return Scene(photo, surround, plate, (), layers, (), mask, hatch=hatch, split=split)
 
 
 def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

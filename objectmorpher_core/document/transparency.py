@@ -1,0 +1,202 @@
+"""A photo's own transparency: what of it an object takes along, and what stays behind it.
+
+Alpha is straight in files and in `Picture`. Here it is looked at where objects are cut out of a
+photo, where the place is filled that they leave, and where such a photo is looked at. None of it
+does anything for a photo without an alpha channel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from ..base.arrays import F32, Mask, Pixels, Selection, crop, frozen, unit_pixels
+from ..pictures.image import Picture
+from .model import SELECTED, Matte, Photo, Plate
+
+CLEAR = 1 / 16  # alpha below which a pixel's colour is not relied on
+EDGE = 0.004  # x the photo's diagonal: the edge beside clear ground where nothing else is behind
+LEAST_EDGE = 2.0  # px
+SOFT = 8.0  # x that, over which an edge may be soft
+MOST_SOFT = 64.0  # px
+STEP = 1.5 / 255  # of alpha, by which a coverage is rounded
+SQUARES = 96  # of the checker, along a photo's longer side
+LIGHT, DARK = 0.62, 0.50  # sRGB grey of the checker's squares
+
+
+def within(selection: Selection | None, picture: Picture) -> Selection | None:
+    """What of a selection (H, W) the photo shows, soft where it fades into clear ground.
+
+    The soft edge that a photo has there is the object's, also where it was too faint to be
+    selected. What is seen through throughout is selected as what is solid.
+    """
+    if selection is None or picture.alpha is None or selection.shape != picture.alpha.shape:
+        return selection
+    if picture.alpha.all():  # no ground is clear
+        return selection
+    alpha = unit_pixels(picture.alpha)
+    away = _distance(alpha <= 0)
+    share = _edge_shares(alpha, away)
+    if (share >= 1).all():
+        return selection
+    is_soft = selection.dtype != np.bool_
+    own = selection >= SELECTED if is_soft else selection
+    coverage = np.rint(255 * share).astype(np.uint8)
+    solid = coverage >= SELECTED
+    beside = _distance(own)
+    is_open = (share < 1) | (away <= _width(share))  # the edge itself, and no other thing
+    is_rim = ~own & solid & is_open & (beside <= _width(share))  # selected a little short
+    near = np.minimum(_reach(share), _distance(solid & ~own & ~is_rim))
+    is_fringe = ~own & (is_rim | (~solid & (beside < near)))
+    most = selection if is_soft else own * np.uint8(255)
+    found = np.where(is_fringe, coverage, np.minimum(coverage, most))
+    is_hard = not is_soft and not ((found > 0) & (found < 255)).any()
+    return frozen(found > 0 if is_hard else found)
+
+
+def _edge_shares(alpha: F32, away: F32) -> F32:
+    """(h, w) in [0, 1]: how solid each place is beside what it borders, near clear ground.
+
+    `away` (h, w): px from that; beyond, it is 1. So a pane of glass ends as sharply as it does,
+    and a blurred edge softly.
+    """
+    reach = round(_reach(alpha))
+    around = cv2.dilate(alpha, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    share = np.where(away <= reach, alpha / np.maximum(around, 1e-6), 1)
+    return np.asarray(share, np.float32)
+
+
+def _reach(image: np.ndarray) -> float:
+    """Px from clear ground in which an edge may be soft, for a photo of this size."""
+    return min(SOFT * _width(image), MOST_SOFT)
+
+
+def _width(image: np.ndarray) -> float:
+    """Px from clear ground in which nothing else is behind an object."""
+    return max(LEAST_EDGE, EDGE * float(np.hypot(*image.shape[:2])))
+
+
+def with_opacity(matte: Matte, picture: Picture, mask: Mask | None) -> Matte:
+    """The `matte` of a `mask` (H, W), no more opaque than the photo is there.
+
+    It is `matte` itself where that changes nothing. Where the photo is not opaque its colours are
+    the object's own: what is behind it is not mixed in.
+    """
+    if picture.alpha is None:
+        return matte
+    whole = unit_pixels(picture.alpha)
+    there, away = (_around(image, matte.box) for image in (whole, _distance(whole <= 0)))
+    alpha = np.minimum(there, matte.alpha)
+    own = matte.alpha > 0
+    if mask is not None:
+        own |= crop(mask, (0, 0, *whole.shape[::-1]), matte.box)
+    is_edge = own & (away <= _width(whole))  # nothing else can be behind it
+    alpha = np.where(is_edge | (there - alpha < STEP), there, alpha)
+    if np.array_equal(alpha, matte.alpha):
+        return matte
+    is_own = (is_edge | (there < 1)) & (there > CLEAR)
+    colours = unit_pixels(_around(picture.pixels, matte.box))
+    foreground = np.where(is_own[..., None], colours, matte.foreground)
+    return replace(matte, alpha=alpha.astype(np.float32), foreground=foreground)
+
+
+def _around(image: np.ndarray, box: tuple[int, int, int, int]) -> np.ndarray:
+    """The part `box` of an image (H, W, ...), which is mirrored at its frame."""
+    height, width = image.shape[:2]
+    x0, y0, x1, y1 = box
+    inner = image[max(y0, 0) : y1, max(x0, 0) : x1]
+    pads = max(-y0, 0), max(y1 - height, 0), max(-x0, 0), max(x1 - width, 0)
+    return cv2.copyMakeBorder(inner, *pads, cv2.BORDER_REFLECT_101) if any(pads) else inner
+
+
+def _distance(there: Mask) -> F32:
+    """(h, w) px to the nearest pixel that is `there`; very far where there is none."""
+    away = cv2.distanceTransform((~there).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.asarray(away, np.float32)
+
+
+def alpha_behind(alpha: np.ndarray, plate: Plate, gone: tuple[Matte, ...]) -> np.ndarray:
+    """A photo's `alpha` (H, W), u8 or u16, where the objects with these mattes are gone.
+
+    What lies around the plate's hole goes on in it. Beside the objects nothing becomes more
+    opaque than it is.
+    """
+    height, width = alpha.shape
+    x0, y0, x1, y1 = plate.box
+    box = max(x0 - 1, 0), max(y0 - 1, 0), min(x1 + 1, width), min(y1 + 1, height)
+    hole = crop(plate.hole, plate.box, box)
+    old = alpha[box[1] : box[3], box[0] : box[2]]
+    covered = np.zeros(hole.shape, bool)
+    for matte in gone:
+        covered |= crop(matte.alpha, matte.box, box) > 0
+    new = _nearest(old, ~hole)
+    result = alpha.copy()
+    result[box[1] : box[3], box[0] : box[2]] = np.where(
+        hole, np.where(covered, new, np.minimum(old, new)), old
+    )
+    return frozen(result)
+
+
+def continued(picture: Picture, covered: Mask) -> Pixels:
+    """The pixels (H, W, 3) for what is to be filled in where they are `covered` (H, W).
+
+    Whatever colour lies under clear ground is none that could be copied: the colours of what is
+    seen go on there.
+    """
+    if picture.alpha is None:
+        return picture.pixels
+    is_seen = picture.alpha > CLEAR * np.iinfo(picture.alpha.dtype).max
+    known = is_seen & ~covered
+    if not known.any() or is_seen.all():
+        return picture.pixels
+    return frozen(np.where((is_seen | covered)[..., None], picture.pixels,
+                           _nearest(picture.pixels, known)))  # fmt: skip
+
+
+def _nearest(image: np.ndarray, known: Mask) -> np.ndarray:
+    """`image` (h, w, ...) where it is `known` (h, w); elsewhere as at the nearest such place."""
+    if not known.any():
+        return image
+    _, found = cv2.distanceTransformWithLabels(
+        (~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    labels = np.asarray(found, np.int32)
+    values = np.zeros((int(labels.max()) + 1, *image.shape[2:]), image.dtype)
+    values[labels[known]] = image[known]
+    return values[labels]
+
+
+def on_checker(
+    pixels: Pixels, alpha: np.ndarray, size: tuple[int, int], left: int = 0, top: int = 0
+) -> Pixels:
+    """Straight `pixels` (h, w, 3) over a checker, as far as they are transparent.
+
+    They are at `left`, `top` px in a photo of `size` (w, h), and so is the checker.
+    """
+    side = max(round(max(size) / SQUARES), 1)
+    rows, columns = (np.arange(first, first + n) // side
+                     for first, n in zip((top, left), alpha.shape, strict=True))  # fmt: skip
+    ground = np.where((rows[:, None] + columns) % 2 == 0, np.float32(LIGHT), np.float32(DARK))
+    own = unit_pixels(alpha)
+    most = np.float32(np.iinfo(pixels.dtype).max)
+    mixed = pixels * own[..., None] + (most * (1 - own) * ground)[..., None]
+    return frozen(np.rint(mixed).astype(pixels.dtype))
+
+
+def seen_plate(photo: Photo, plate: Plate | None, gone: tuple[Matte, ...]) -> Plate | None:
+    """`plate` as it is shown where the objects with the mattes `gone` are not, as `seen`."""
+    alpha = photo.picture.alpha
+    if alpha is None or plate is None:
+        return plate
+    x0, y0, x1, y1 = plate.box
+    behind = alpha_behind(alpha, plate, gone)[y0:y1, x0:x1]
+    own = np.where(plate.hole[..., None], plate.pixels, photo.pixels[y0:y1, x0:x1])
+    return replace(plate, pixels=on_checker(own, behind, photo.size, x0, y0))
+
+
+def seen(photo: Photo) -> Pixels:
+    """(H, W, 3) a photo as it is shown: on a checker where it is transparent."""
+    alpha = photo.picture.alpha
+    return photo.pixels if alpha is None else on_checker(photo.pixels, alpha, photo.size)
