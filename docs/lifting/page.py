@@ -164,10 +164,10 @@ eye come twice. Quilts alone, without the completion beneath, break the stripes 
 A mask that was drawn around hair takes in the background between it, which stood beside a turned
 head as a shell. Where the mask lies on no edge of the picture and colours agree, the matte is now
 looked for three times as far from it, and the body ends where the object is solid; the brim carries
-the rest. Of a made furry disc, turned by 25 degrees, 6 % of what is seen are colours of the ground,
-instead of 23. Of six photographs of animals and people an alpaca's fleece and a horse's head have
-lost their shells, and a man's hair on one side; a dog's side, a mane and hair before leaves have
-not. Crisp edges and the solids here stay as they were.
+the rest. Of what is seen of a made furry disc, turned by 25 degrees, 5 % have the ground's colours
+instead of 24. Of six photographs of animals and people an alpaca's fleece, a horse's head and tail
+and one side of a man's hair have lost their shells; a dog's side, a mane, and hair before leaves
+have not. The composites of [matting](../matting/README.md), whose masks fit, stay as they were.
 
 ## Beyond the photo's frame
 

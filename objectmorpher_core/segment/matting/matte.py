@@ -181,24 +181,37 @@ def build_matte(
     band = band_width(mask.shape[1], mask.shape[0])
     extension = frame_extension(is_selected(mask))
     mask = extended_mask(mask, extension)
-    far = _far(pixels, mask, band, extension)
+    mixed = None if mixed is None else extended_mask(mixed, extension)
+    far = _far(pixels, mask, mixed, band, extension)
     left, top, right, bottom = far[0] if far else box_of(mask, margin)
     window = np.s_[top:bottom, left:right]
     part = extended_part(pixels, extension, window)
-    own = None if mixed is None else extended_mask(mixed, extension)[window]
+    own = None if mixed is None else mixed[window]
     alpha, colours = soft_cutout(part, mask[window], band, own, far[1] if far else None)
     return Matte(left - extension[2], top - extension[0], alpha, colours.foreground)
 
 
 def _far(
-    pixels: Pixels, mask: Selection, band: float, extension: tuple[int, int, int, int]
+    pixels: Pixels,
+    mask: Selection,
+    mixed: Mask | None,
+    band: float,
+    extension: tuple[int, int, int, int],
 ) -> tuple[tuple[int, int, int, int], Mask] | None:
-    """A box with more of the extended photo around, and where in it the edge may be farther off."""
+    """A box with more of the extended photo around, and where in it the edge may be farther off.
+
+    Near what an artist drew soft, or brushed, it is not.
+    """
     box = box_of(mask, int(np.ceil((STRAY * REACH + MARGIN) * band)))
     window = np.s_[box[1] : box[3], box[0] : box[2]]
     part = extended_part(pixels, extension, window)
     found = strays(part, is_selected(mask[window]), band, REACH * band)
-    return None if found is None else (box, found)
+    drawn = _drawn(mask[window], band)
+    if mixed is not None:
+        drawn |= mixed[window]
+    if found is not None and drawn.any():
+        found &= ~grow(drawn, STRAY * REACH * band)
+    return (box, found) if found is not None and found.any() else None
 
 
 def soft_cutout(

@@ -30,7 +30,7 @@ NEAR = 0.04  # sRGB for one wide reach: how much rather a colour is looked for n
 MOST = 2000  # colours of each side
 NEIGHBOURS = 3
 ALIKE = 0.02  # sRGB: a colour so far from one that is known may be of it
-LEAST = 9.0  # x band^2: area of what must have changed to be looked at
+LEAST = 11.0  # x band^2: area of what must have changed to be looked at
 AROUND = 2.0  # x band: looked at with it
 
 
