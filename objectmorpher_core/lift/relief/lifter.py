@@ -45,7 +45,7 @@ from .further_views import settled, with_views
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
 from .sides import with_sides
-from .silhouette import ReliefSilhouette
+from .silhouette import ReliefSilhouette, solid_part
 from .spreading import SurfacePoints, spread
 
 TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
@@ -90,7 +90,9 @@ class ReliefLifter:
         Raises LiftError for an object of fewer than about 25 pixels, and for one that has no depth
         in so wide a view.
         """
-        mask, camera, matte = subject.mask, subject.camera, subject.matte
+        mask, camera, matte = solid_part(subject.mask, subject.matte), subject.camera, subject.matte
+        is_fringed = mask is not subject.mask
+        subject = replace(subject, mask=mask)
         area = int(np.count_nonzero(mask))
         if area < LEAST_AREA:
             raise LiftError(f"the object is only {area} pixels, too small to lift")
@@ -105,7 +107,7 @@ class ReliefLifter:
         progress(0.3, "Building the 3D shape")
         rng = np.random.default_rng(seed)
         band = max(band_width(camera.width, camera.height), _softness(mask, matte, outline.extent))
-        surface, spacing = spread(body, settings.count, band, rng, matte)
+        surface, spacing = spread(body, settings.count, band, rng, matte, is_fringed)
         if hidden is not None and hidden.any():
             surface = _unseen(surface, hidden, SEAM * spacing)
         progress(0.7, "Colouring its back")
@@ -124,6 +126,7 @@ class ReliefLifter:
 
     def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:
         """The shape alone, on which `lift` spreads its Gaussians."""
+        subject = replace(subject, mask=solid_part(subject.mask, subject.matte))
         area = int(np.count_nonzero(subject.mask))
         canvas = _canvas(subject.matte, _hidden(subject, settings), area, settings.count)
         return self._body(subject, settings, _axis(canvas, settings), silent)

@@ -12,11 +12,12 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, Mask
+from ...base.arrays import F32, F64, U8, Mask, crop
 from ...base.kernel_files import numba
-from ...base.masks import box_of
+from ...base.masks import box_of, dilated, disc
 from ...base.poisson_disk import distance_inside
-from ...segment.matting.matte import extended_mask, frame_extension
+from ...document.model import Matte
+from ...segment.matting.matte import band_width, extended_mask, frame_extension
 from .canvas import bilinear
 
 GRID = 256  # cells on the longer side of the box
@@ -251,3 +252,61 @@ def inwardness(alpha: F32) -> F32:
     deep = np.minimum(deep, np.maximum(OF_RADIUS * largest_disc(away), THIN))
     inward = (away / deep).clip(0, 1).astype(np.float32)
     return np.asarray(cv2.resize(inward, alpha.shape[::-1]), np.float32)
+
+
+# Of hair an outline that was drawn around it holds more than what is solid.
+
+SOLID = 0.9  # share of what is near, within the outline, that the matte covers where it is solid
+HOLLOW = 0.2  # of what is not, at least, is less than half covered: what is drawn never is
+LEAST = 12.0  # x the band squared: area of that
+BESIDE = 2.0  # x the band, around what is not: strands there are none of the body
+PIECE = 0.05  # of the largest piece, at least, else it is a lock of hair
+
+
+def solid_part(mask: Mask, matte: Matte) -> Mask:
+    """`mask` (H, W) without what is hair and the gaps in it: the brim carries it, see `spread`.
+
+    An edge no farther off than masks are, and a limb however thin, stay as they are; the same array
+    where there is nothing else.
+    """
+    band = band_width(mask.shape[1], mask.shape[0])
+    box = box_of(mask, int(3 * band) + 2)
+    window = np.s_[box[1] : box[3], box[0] : box[2]]
+    part, alpha, spot = mask[window], crop(matte.alpha, matte.box, box), disc(int(np.ceil(band)))
+    share, whole = (
+        cv2.GaussianBlur(field.astype(np.float32), (0, 0), band) for field in (part * alpha, part)
+    )
+    gaps = _opened(part & (share < SOLID * whole), spot)
+    pieces, area = _pieces(gaps)
+    is_gap = (_pieces_in(pieces, alpha < 0.5) > HOLLOW * area) & (area > LEAST * band**2)
+    gaps = is_gap[pieces]
+    if not gaps.any():
+        return mask
+    near = dilated(gaps, int(np.ceil(BESIDE * band)))
+    rest = part & ~gaps
+    rest &= ~near | _opened(rest, spot)
+    pieces, area = _pieces(rest)
+    kept = (area >= PIECE * area.max()) | (_pieces_in(pieces, near) == 0)
+    kept[0] = False
+    solid = np.zeros_like(mask)
+    solid[window] = kept[pieces]
+    return solid if solid.any() else mask
+
+
+def _opened(mask: Mask, spot: U8) -> Mask:
+    return cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, spot).view(np.bool_)
+
+
+def _pieces(mask: Mask) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (h, w) of the pieces of `mask` (h, w), 0 outside, and the px of each, of 0 none."""
+    count, pieces = cv2.connectedComponents(mask.view(np.uint8))
+    area = np.bincount(pieces.ravel(), minlength=count)
+    area[0] = 0
+    return np.asarray(pieces), area
+
+
+def _pieces_in(pieces: np.ndarray, where: Mask) -> np.ndarray:
+    """How many px of each of the `pieces` (h, w) are `where` (h, w); of 0 none."""
+    found = np.bincount(pieces[where], minlength=int(pieces.max()) + 1)
+    found[0] = 0
+    return found

@@ -133,12 +133,13 @@ def spread(
     band: float,
     rng: np.random.Generator,
     matte: Matte | None = None,
+    is_fringed: bool = False,
 ) -> tuple[SurfacePoints, float]:
     """About `count` points and their mean spacing in px.
 
     `band`: how far outside the silhouette the matte covers something, px. The `matte` tells where
-    exactly the outline is. Candidates are drawn in proportion to the true area, then thinned to one
-    spacing in 3D.
+    exactly the outline is; where that `is_fringed`, nothing is put where the matte covers nothing.
+    Candidates are drawn in proportion to the true area, then thinned to one spacing in 3D.
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
     outline, solid = body.silhouette, body.solid
@@ -162,7 +163,8 @@ def spread(
     for chain, area, side in zip(chains, areas, (FRONT, BACK), strict=True):
         xy = _draw(outline, area * density, rng)
         drawn.append(np.vstack([chain, _withdrawn(body, xy, side, lines, spacing)]))
-    around = [(_brim(body, band, spacing, density, rng), 0)]
+    fringe = matte if is_fringed else None
+    around = [(_brim(body, band, spacing, density, rng, fringe), 0)]
     around += _inner(body, spacing, density, rng)
     # Most candidates of the sheets are dropped: their normals are found when that is done.
     clouds = [(xy, _heights(body, xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
@@ -515,9 +517,17 @@ def _end(line: RimLine, fields: F64, outline: ReliefSilhouette, spacing: float) 
 
 
 def _brim(
-    body: ReliefBody, band: float, spacing: float, density: float, rng: np.random.Generator
+    body: ReliefBody,
+    band: float,
+    spacing: float,
+    density: float,
+    rng: np.random.Generator,
+    fringe: Matte | None,
 ) -> SurfacePoints:
-    """Around the silhouette, a little past the matte's `band` px, at the height of its middle."""
+    """Around the silhouette, a little past the matte's `band` px, at the height of its middle.
+
+    Of a `fringe` only as far as it covers something.
+    """
     outline, reach = body.silhouette, band + BRIM * spacing
     pad = int(np.ceil(reach / outline.cell)) + 1
     inside = np.pad(outline.inside, pad).astype(np.uint8)
@@ -526,6 +536,10 @@ def _brim(
     if body.behind is not None:  # between two parts its height would be that of neither
         ring &= np.abs(np.subtract(*_away_from_parts(body, pad))) > spacing
     xy = _draw(outline, np.where(ring, density * outline.cell**2, 0.0), rng) - pad * outline.cell
+    if fringe is not None:
+        wide = 2 * int(np.ceil(BRIM * spacing)) + 1
+        covered = cv2.dilate(fringe.alpha, np.ones((wide, wide), np.uint8))
+        xy = xy[bilinear(covered, xy - [fringe.left + 0.5, fringe.top + 0.5]) > 0]
     height, _ = body.sample(xy, MIDDLE)
     if body.solid is not None:
         own = _is_own(body.solid, outline, xy)

@@ -19,11 +19,13 @@ from ...document.model import Matte
 from ..mask_edit import FULL, grow, is_selected, is_soft
 from .soft_edge import find_alpha
 from .soft_edge import signed_distance as signed_distance
+from .straying import STRAY, strays
 from .unmix import Unmixed, coarse_colours, unmixed
 
 BAND = 0.0040  # x the photo's diagonal: how far a mask's edge may be off, about
 MIN_BAND = 2.0  # px
 REACH = 4.0  # x band: how far from the mask's edge alpha may be soft
+TRUST = 0.1  # in a mask where its edge was found to be farther off
 MARGIN = 4.0  # x band, kept around the object in the crop
 LOOKED = 4  # px from the frame, at least, over which a run's width is seen to change
 EXTENSION = 0.12  # x the object's size: how far it goes on where the photo ends
@@ -179,20 +181,50 @@ def build_matte(
     band = band_width(mask.shape[1], mask.shape[0])
     extension = frame_extension(is_selected(mask))
     mask = extended_mask(mask, extension)
-    left, top, right, bottom = box_of(mask, margin)
+    mixed = None if mixed is None else extended_mask(mixed, extension)
+    far = _far(pixels, mask, mixed, band, extension)
+    left, top, right, bottom = far[0] if far else box_of(mask, margin)
     window = np.s_[top:bottom, left:right]
     part = extended_part(pixels, extension, window)
-    own = None if mixed is None else extended_mask(mixed, extension)[window]
-    alpha, colours = soft_cutout(part, mask[window], band, own)
+    own = None if mixed is None else mixed[window]
+    alpha, colours = soft_cutout(part, mask[window], band, own, far[1] if far else None)
     return Matte(left - extension[2], top - extension[0], alpha, colours.foreground)
 
 
+def _far(
+    pixels: Pixels,
+    mask: Selection,
+    mixed: Mask | None,
+    band: float,
+    extension: tuple[int, int, int, int],
+) -> tuple[tuple[int, int, int, int], Mask] | None:
+    """A box with more of the extended photo around, and where in it the edge may be farther off.
+
+    Near what an artist drew soft, or brushed, it is not.
+    """
+    box = box_of(mask, int(np.ceil((STRAY * REACH + MARGIN) * band)))
+    window = np.s_[box[1] : box[3], box[0] : box[2]]
+    part = extended_part(pixels, extension, window)
+    found = strays(part, is_selected(mask[window]), band, REACH * band)
+    drawn = _drawn(mask[window], band)
+    if mixed is not None:
+        drawn |= mixed[window]
+    if found is not None and drawn.any():
+        found &= ~grow(drawn, STRAY * REACH * band)
+    return (box, found) if found is not None and found.any() else None
+
+
 def soft_cutout(
-    pixels: Pixels, selection: Selection, band: float, mixed: Mask | None = None
+    pixels: Pixels,
+    selection: Selection,
+    band: float,
+    mixed: Mask | None = None,
+    far: Mask | None = None,
 ) -> tuple[F32, Unmixed]:
     """Alpha (h, w) and the colours of a photo's crop (h, w, 3) in which an object is selected.
 
-    Where it is `mixed` (h, w), the selection is alpha, as the edge brush found it.
+    Where it is `mixed` (h, w), the selection is alpha, as the edge brush found it. `far` (h, w):
+    where the edge is to be looked for farther from the mask's than elsewhere, see `strays`.
     """
     if mixed is None or not mixed.any():
         painted, drawn = selection, _drawn(selection, band)
@@ -200,6 +232,11 @@ def soft_cutout(
         painted = np.where(mixed, is_selected(selection) * np.uint8(FULL), selection)
         drawn = _drawn(painted, band) | mixed
     alpha = find_alpha(pixels, selection, drawn, band, REACH * band)
+    if far is not None:
+        kept = ~far | drawn
+        known = (alpha * FULL + 0.5).astype(np.uint8)
+        wide = find_alpha(pixels, known, kept, STRAY * band, STRAY * REACH * band, TRUST)
+        alpha = np.where(kept, alpha, wide)
     if not drawn.any():
         return alpha, unmixed(pixels, alpha)
     # Of an edge that was drawn the photo is no mixture: what is inside it is the object's own.

@@ -49,7 +49,7 @@ WHOLE_PICTURE = (slice(None), slice(None))
 
 
 @dataclass(frozen=True, eq=False)
-class _Size:
+class CropSize:
     """A crop at one of its sizes, and what is known of it."""
 
     pixels: np.ndarray  # (h, w, 3) the photo's own, or in [0, 1]
@@ -57,6 +57,12 @@ class _Size:
     mask: Mask  # (h, w)
     drawn: Mask  # (h, w) where alpha is the artist's
     coverage: np.ndarray  # (h, w) that alpha, u8 or in [0, 1]
+
+    @staticmethod
+    def of(pixels: Pixels, selection: Selection, drawn: Mask, band: float) -> CropSize:
+        """A crop (h, w, 3) at its full size."""
+        coverage = selection if drawn.any() else np.zeros(drawn.shape, np.uint8)
+        return CropSize(pixels, band, is_selected(selection), drawn, coverage)
 
     def rgb(self, window: Window) -> F32:
         """A part of it, in [0, 1]."""
@@ -66,36 +72,40 @@ class _Size:
         part = self.coverage[window]
         return part if part.dtype == np.float32 else part * np.float32(1 / FULL)
 
-    def half(self) -> _Size:
+    def half(self) -> CropSize:
         pixels = halved_pixels(self.pixels)
         # What is thin stays, however small the picture.
         share, thin = (halved(m.view(np.uint8)) for m in (self.mask, _thin(self.mask, 3)))
         mask = (share >= 0.5) | (thin >= 0.25)
         if not self.drawn.any():
             nothing = np.zeros_like(mask)
-            return _Size(pixels, self.band / 2, mask, nothing, nothing.astype(np.float32))
+            return CropSize(pixels, self.band / 2, mask, nothing, nothing.astype(np.float32))
         drawn = halved(self.drawn.view(np.uint8)) >= 0.5
-        return _Size(pixels, self.band / 2, mask, drawn, halved(self.drawn_alpha(WHOLE_PICTURE)))
+        return CropSize(pixels, self.band / 2, mask, drawn, halved(self.drawn_alpha(WHOLE_PICTURE)))
 
 
 def find_alpha(
-    pixels: Pixels, selection: Selection, drawn: Mask, band: float, reach: float
-) -> F32:  # fmt: skip
+    pixels: Pixels,
+    selection: Selection,
+    drawn: Mask,
+    band: float,
+    reach: float,
+    trust: float = 1.0,
+) -> F32:
     """Alpha (h, w) of what is selected in a crop (h, w, 3).
 
     `band` px is what the mask's edge may be off, about; within `reach` px of it alpha may be soft.
-    Where it is `drawn` (h, w), alpha is the selection's own.
+    Where it is `drawn` (h, w), alpha is the selection's own. `trust`: how much the mask counts.
     """
-    coverage = selection if drawn.any() else np.zeros(drawn.shape, np.uint8)
-    sizes = [_Size(pixels, band, is_selected(selection), drawn, coverage)]
+    sizes = [CropSize.of(pixels, selection, drawn, band)]
     while sizes[-1].band > COARSEST and min(drawn.shape) >> len(sizes) > 2 * THIN:
         sizes.append(sizes[-1].half())
     alpha: F32 | None = None
-    small: _Size | None = None
+    small: CropSize | None = None
     for k in reversed(range(len(sizes))):
         size = sizes.pop()
         if alpha is None or small is None or size.band <= WHOLE:
-            alpha = _whole_band(size, reach * 0.5**k, alpha)
+            alpha = whole_band(size, reach * 0.5**k, alpha, trust)
         else:
             alpha = _sharper(size, alpha, small)
         small = size
@@ -103,7 +113,7 @@ def find_alpha(
     return alpha
 
 
-def _whole_band(size: _Size, reach: float, before: F32 | None) -> F32:
+def whole_band(size: CropSize, reach: float, before: F32 | None, trust: float = 1.0) -> F32:
     """Alpha (h, w) of a small picture; `before` is that of half its size."""
     band = size.band
     distance = signed_distance(size.mask)
@@ -111,10 +121,10 @@ def _whole_band(size: _Size, reach: float, before: F32 | None) -> F32:
     away = np.abs(distance)
     unknown = (away < reach) & ~(ridge & (distance > RIDGE)) & ~size.drawn
     astray = ASTRAY * band
-    clearness = _clearness(size.rgb(WHOLE_PICTURE), distance, reach)
+    clearness = clearness_of(size.rgb(WHOLE_PICTURE), distance, reach)
     doubt = 1 / (1 + (clearness / CLEAR) ** 2)
     weight = BESIDE + FAR * doubt * np.clip((away - astray) / max(reach - astray, 0.5), 0, 1)
-    weight *= (TUNED / band) ** 2  # the same influence, over more pixels
+    weight *= trust * (TUNED / band) ** 2  # the same influence, over more pixels
     likely = np.clip(0.5 + distance / (2 * astray), 0, 1)
     alpha = np.where(unknown, likely, size.mask).astype(np.float32)
     alpha[size.drawn] = size.drawn_alpha(WHOLE_PICTURE)[size.drawn]
@@ -127,7 +137,7 @@ def _whole_band(size: _Size, reach: float, before: F32 | None) -> F32:
     return _cleaned(np.where(unknown, clear, solved), unknown)
 
 
-def _clearness(rgb: F32, distance: F32, reach: float) -> F32:
+def clearness_of(rgb: F32, distance: F32, reach: float) -> F32:
     """(h, w) how far apart the colours of object and background are nearby.
 
     In their variances, along the line between their means. Hair differs from a plain sky,
@@ -176,7 +186,7 @@ def _cleared(alpha: F32, distance: F32, widths: tuple[float, float], chance: F32
     return np.asarray(np.clip(cleared, 0, 1), np.float32)
 
 
-def _sharper(size: _Size, before: F32, small: _Size) -> F32:
+def _sharper(size: CropSize, before: F32, small: CropSize) -> F32:
     """Alpha (h, w), from that of half the size, `small`."""
     alpha = np.empty(size.mask.shape, np.float32)
     tiles = list(_tiles(alpha.shape))
@@ -189,7 +199,7 @@ def _sharper(size: _Size, before: F32, small: _Size) -> F32:
     return alpha
 
 
-def _sharper_tile(size: _Size, small: _Size, before: F32, tile: Window) -> F32:
+def _sharper_tile(size: CropSize, small: CropSize, before: F32, tile: Window) -> F32:
     """One tile of `_sharper`."""
     around = _wider(tile, OVERLAP, size.mask.shape)
     inner = _within(tile, around)
@@ -206,7 +216,7 @@ def _sharper_tile(size: _Size, small: _Size, before: F32, tile: Window) -> F32:
     return _cleaned(start, is_open)[inner]
 
 
-def _enlarged(size: _Size, before: F32, window: Window) -> tuple[F32, Mask]:
+def _enlarged(size: CropSize, before: F32, window: Window) -> tuple[F32, Mask]:
     """Alpha in a part (h, w) as half the size has it, and where that is open."""
     wide = _wider(window, MARGIN, size.mask.shape)
     coarse, mask, drawn = before[_halved_window(wide)], size.mask[wide], size.drawn[wide]

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.lift.relief.silhouette import GRID, ReliefSilhouette, lower_hull
+from objectmorpher_core.document.model import Matte
+from objectmorpher_core.lift.relief.silhouette import (
+    GRID,
+    ReliefSilhouette,
+    lower_hull,
+    solid_part,
+)
 from tests import shapes
 
 EXACT = 1e-9
@@ -169,3 +176,29 @@ def test_what_leaves_the_photo_has_no_outline_at_the_frame(height):
     assert outline.inside[-2, -2]
     far = outline.depth[-2, -2]
     assert far > 0.9 * outline.depth.max()
+
+
+def _matte(alpha: np.ndarray) -> Matte:
+    return Matte(0, 0, alpha.astype(np.float32), np.zeros((*alpha.shape, 3), np.float32))
+
+
+@masks
+def test_what_is_covered_is_solid_however_thin_it_is(name):
+    mask = shapes.mask(name)
+    near = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5)
+    drawn = np.where(mask, np.maximum(near, 0.5), near)  # glass, too, is never less than selected
+    for alpha in (mask, near, drawn, 0.6 * mask):
+        assert solid_part(mask, _matte(alpha)) is mask
+
+
+def test_gaps_between_hairs_and_single_hairs_are_not_solid():
+    y, x = np.mgrid[:240, :320] + 0.5
+    away = np.hypot(x - 160, y - 120)
+    hairs = np.sin(60 * np.arctan2(y - 120, x - 160)) > 0.6
+    limb = (np.abs(y - 120) < 2) & (x < 160) & (x > 20)
+    alpha = (away < 60) | (away < 90) & hairs | limb
+    mask = (away < 90) | limb
+    solid = solid_part(mask, _matte(alpha))
+    assert solid[away < 55].all()
+    assert not solid[(away > 70) & (x > 160)].any()
+    assert solid[limb & (x < 60)].all(), "what is thin and apart from hair stays"

@@ -22,6 +22,7 @@ from objectmorpher_core.raster.rules import RULES
 from objectmorpher_core.raster.texture import sample_texture
 from objectmorpher_core.raster.trust import trust_in
 from tests import shapes
+from tests.core.segment.test_matte import furry
 
 LEVEL = 2 / 255
 TURN = Placement(turn=(45.0, 0.0, 0.0))
@@ -134,6 +135,17 @@ def test_nothing_but_the_object_can_be_looked_up(vase):
         picture = _drawn(vase, vase.lifted, Placement(turn=turn))
         inner = cv2.erode((picture.alpha > 0.99).astype(np.uint8), np.ones((3, 3))) > 0
         assert picture.color[inner, 1].min() > 0.4 * darkest
+
+
+@pytest.mark.parametrize("yaw", [25.0, -25.0])
+def test_beside_turned_fur_stands_hardly_any_ground(yaw):
+    """Of a mask drawn around fur, nearly a quarter of what was seen beside it was the ground."""
+    photo, _, mask, _ = furry()
+    scene = shapes.lifted_scene(photo, mask, 6000)
+    picture = _drawn(scene, scene.lifted, Placement(turn=(yaw, 0.0, 0.0)))
+    red, *others = np.moveaxis(picture.color, -1, 0)  # fur is red before all, neither ground is
+    is_ground = np.maximum(*others) > red
+    assert picture.alpha[is_ground].sum() < 0.1 * picture.alpha.sum()
 
 
 def test_at_rest_nothing_of_it_is_seen(scene):

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import crop, pixels_from_unit, unit_pixels
+from objectmorpher_core.base.masks import dilated, disc
 from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.segment.matting import soft_edge, unmix
 from objectmorpher_core.segment.matting.matte import (
+    REACH,
     band_width,
     build_matte,
     extended,
@@ -23,6 +25,7 @@ from objectmorpher_core.segment.matting.matte import (
     unveiled,
     veil,
 )
+from objectmorpher_core.segment.matting.straying import strays
 from objectmorpher_core.segment.matting.unmix import exact, unmixed
 from tests import shapes
 
@@ -243,6 +246,36 @@ def hairy(width: int = 320, height: int = 240, seed: int = 1) -> np.ndarray:
     return cv2.resize(soft, (width, height), interpolation=cv2.INTER_AREA) / np.float32(255)
 
 
+def furry() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A photo u8 of a furry disc before two colours, its alpha, a mask drawn around it, its body.
+
+    Between the hairs the mask takes in what is behind, up to three times as far as a mask is
+    thought to be off.
+    """
+    width, height, fine, random = 480, 360, 4, np.random.default_rng(3)
+    middle, radius = np.array([width, height]) * fine // 2, 0.22 * fine * width
+    large = np.zeros((fine * height, fine * width), np.uint8)
+    cv2.circle(large, middle.tolist(), round(radius), (255,), -1)
+    for angle in random.uniform(0, 2 * np.pi, 700):
+        out = np.array([np.cos(angle), np.sin(angle)])
+        end = middle + out * (radius + fine * random.uniform(6, 22))
+        end += fine * 4 * random.normal(size=2)
+        start = np.rint(middle + out * (radius - fine)).astype(int)
+        wide = int(random.integers(2, 6))
+        cv2.line(large, start.tolist(), np.rint(end).astype(int).tolist(), (255,), wide)
+    large = cv2.GaussianBlur(large, (0, 0), 2.0)
+    soft = cv2.resize(large, (width, height), interpolation=cv2.INTER_AREA) / np.float32(255)
+    noise = cv2.GaussianBlur(random.normal(size=(height, width, 3)), (0, 0), 2.0)
+    noise *= 4 / noise.std()
+    left = np.arange(width)[None, :, None] < width / 2
+    ground = np.where(left, [60, 95, 140], [70, 140, 90]) + noise[::-1]
+    mixed = soft[..., None] * ([190, 120, 60] + noise) + (1 - soft[..., None]) * ground
+    tips = cv2.morphologyEx((soft > 0.25).astype(np.uint8), cv2.MORPH_CLOSE, disc(12))
+    y, x = np.mgrid[:height, :width] + 0.5
+    body = np.hypot(x - width / 2, y - height / 2) < radius / fine
+    return np.rint(mixed).clip(0, 255).astype(np.uint8), soft, dilated(tips > 0, 4), body
+
+
 def composite_of(soft: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A photo u8 of a textured object of coverage `soft`, its colours, and the background's."""
     random = np.random.default_rng(seed)
@@ -291,6 +324,29 @@ def test_the_cut_out_is_nearer_to_the_truth_than_its_mask(name):
     )
     assert squares < MOST_LEFT[name][0]
     assert seen < MOST_LEFT[name][1]
+
+
+def test_between_hairs_the_ground_shows_however_far_off_the_mask_is():
+    photo, soft, mask, body = furry()
+    matte = build_matte(photo, mask, 40)
+    alpha = crop(matte.alpha, matte.box, (0, 0, *mask.shape[::-1]))
+    assert np.abs(alpha - soft).sum() < 0.7 * np.abs(mask - soft).sum()  # 0.60; 0.995 before
+    assert (alpha[cv2.erode(body.astype(np.uint8), disc(3)) > 0] > 0.95).all()
+
+
+@pytest.mark.parametrize("unlike", [90, 25])
+def test_an_edge_is_looked_for_farther_off_only_where_the_mask_lies_on_none(unlike):
+    """Neither at a crisp edge nor where a sleeve is like the wall behind it."""
+    y, x = np.mgrid[:360, :480] + 0.5
+    inside = np.hypot(x - 240, y - 180) < 105
+    noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(360, 480, 3)), (0, 0), 2.0)
+    photo = 120 + unlike * inside[..., None] + noise * (6 / noise.std())
+    pixels, band = np.rint(photo).clip(0, 255).astype(np.uint8), band_width(480, 360)
+    assert strays(pixels, inside, band, REACH * band) is None
+    furred, _, mask, _ = furry()
+    found = strays(furred, mask, band, REACH * band)
+    assert found is not None
+    assert found[mask & ~(cv2.erode(mask.astype(np.uint8), disc(4)) > 0)].mean() > 0.7
 
 
 def test_the_wider_a_blur_the_wider_is_alpha():
