@@ -237,8 +237,9 @@ def _radii(places, ways, inside, start, step, most):
 
 ALIKE = 0.998  # cosine between two axes that are tried as one
 AGREED = 0.4  # share of the places along an axis, that are as far from it on both sides
-ROUGHER = 2.0  # x the other side's roughness
+ROUGHER = 1.5  # x the other side's roughness
 MIDWAY = 2.0  # px, over which places are on one axis, to begin with
+TAKEN, ROUNDS = 0.25, 6  # share of an axis's places that are on its smooth side; of its fit
 APART, ROUGHEST = 3, 4.0  # px between places whose line is bent, and the most that one counts
 ENDS = 0.1  # x the length, that ends are not looked at: they are round
 SPUR = 0.04  # x extent, half the width of what sticks out and is rough on either side
@@ -320,8 +321,18 @@ class _RoughSide:
         rough = [_roughness(side[cut]) for side in (left, right)]
         if max(rough) < ROUGHER * min(rough):
             return None
-        normal = np.array([way[1], -way[0]]) * (1.0 if rough[1] > rough[0] else -1.0)
-        return _RoughSide(middle, normal, 0.5 * (left + right))
+        # What is rough has more often taken something along than left something out.
+        sign, off = (1.0 if rough[1] > rough[0] else -1.0), 0.5 * (left + right)
+        line = np.zeros(2)
+        for _ in range(ROUNDS):
+            beyond = sign * (off - np.polyval(line, along))
+            weight = np.where(beyond > 0, TAKEN, 1 - TAKEN) / np.maximum(np.abs(beyond), 0.3)
+            line = np.polyfit(along, off, 1, w=np.sqrt(weight))
+        lean, start = line
+        normal = np.array([way[1], -way[0]])
+        middle, way = middle + start * normal, (way + lean * normal) / np.hypot(1, lean)
+        normal = sign * np.array([way[1], -way[0]])
+        return _RoughSide(middle, normal, off - np.polyval(line, along))
 
     def agreement(self, tolerance: float) -> float:
         """Share of the places that the axis halves to within `tolerance` px."""

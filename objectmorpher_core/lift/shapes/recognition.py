@@ -208,10 +208,11 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
         if max(fit.weight for fit in fits) < enough:
             fits += _turned(part, evidence, more)
     best = min(fits, key=_length)
-    if best.weight < WHOLE and (even := evened(core)) is not None:
-        fits = _turned(even.evidence, evidence, left_out + LEFT_OUT * even.changed)
-        own = np.where(evidence.fine & ~core.fine, np.inf, even.own)  # handles stay
-        best = min([best, *(replace(fit, own=own) for fit in fits)], key=_length)
+    for part, more, _ in looks if best.weight < EXPLAINED else []:
+        if (even := evened(part)) is not None:
+            fits = _turned(even.evidence, evidence, more + LEFT_OUT * even.changed)
+            own = np.where(evidence.fine & ~part.fine, np.inf, even.own)  # handles stay
+            best = min([best, *(replace(fit, own=own) for fit in fits)], key=_length)
     return best
 
 

@@ -201,8 +201,8 @@ def test_a_lid_seen_nearly_edge_on_reaches_its_far_rim() -> None:
 def _ragged(seen: SeenShape) -> SeenShape:
     """Its left edge takes up to 3 % of its size of the background along, as a click may."""
     mask, rows = seen.mask.copy(), np.flatnonzero(seen.mask.any(1))
-    waves = gaussian_filter1d(np.random.default_rng(2).normal(size=SIDE), 3.0).clip(0.0)
-    waves *= 0.03 * np.ptp(rows) / waves[rows].max()
+    waves = np.abs(gaussian_filter1d(np.random.default_rng(2).normal(size=SIDE), 3.0))
+    waves *= 0.035 * np.ptp(rows) / waves[rows].max()
     for row in rows:
         first = int(np.argmax(mask[row]))
         mask[row, first - round(waves[row]) : first] = True
@@ -232,12 +232,12 @@ def test_of_a_lathes_work_the_smoother_side_says_what_it_is() -> None:
     clean, found = recognised(seen), recognised(ragged)
     assert clean is not None and clean.mesh is not None
     assert found is not None and found.mesh is not None
-    assert found.kind == "round" and found.weight > 0.85
+    assert found.kind == "round" and found.weight > 0.9
     own, true = (_turned(each.mesh) for each in (found, clean) if each.mesh is not None)
     assert (own & true).sum() / (own | true).sum() > 0.985
     assert clean.own is None
     assert found.own is not None
-    assert (found.own < 0)[ragged.mask & ~seen.mask].mean() > 0.6
+    assert (found.own < 0)[ragged.mask & ~seen.mask].mean() > 0.5
     assert (found.own < 0)[seen.mask].mean() < 0.01
 
 
