@@ -245,7 +245,7 @@ ENDS = 0.1  # x the length, that ends are not looked at: they are round
 SPUR = 0.04  # x extent, half the width of what sticks out and is rough on either side
 SLIVER = 0.04  # x extent, farther than which what sticks out is a knob, a corner or a wheel
 STRAY, BESIDE = 1.0, 3  # px of what is none of it, and around that, where its edge is none, either
-CHANGED = 0.06  # x the mask's area, at most
+CHANGED = 0.045  # x the mask's area, at most
 
 
 @dataclass(frozen=True, eq=False)
