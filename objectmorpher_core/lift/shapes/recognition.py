@@ -202,18 +202,26 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
     if (ring := fit_ring(core)) is not None:
         return _described(kind, ring, evidence, left_out)
     fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
-    # A vase's neck, or a foot on a thin stem, is no handle: with them it may look plainer.
-    looks = [(core, left_out, EXPLAINED)] + [(evidence, 0.0, 1.0)] * (left_out > STEM)
-    for part, more, enough in looks:
-        if max(fit.weight for fit in fits) < enough:
-            fits += _turned(part, evidence, more)
-    best = min(fits, key=_length)
-    for part, more, _ in looks if best.weight < EXPLAINED else []:
+    if fits[0].weight < EXPLAINED:
+        fits += _turned(core, evidence, left_out)
+    best, looks = min(fits, key=_length), [(core, left_out)]
+    if left_out > STEM:  # a vase's neck, or a foot on a thin stem, is no handle
+        looks.append((evidence, 0.0))
+        for whole in _turned(evidence, evidence, 0.0):
+            # How it leans says what is seen within its outline, not that it is longer.
+            is_known = best.weight >= WHOLE and _inner(whole) > _inner(best)
+            best = best if is_known else min(best, whole, key=_length)
+    for part, more in looks if best.weight < EXPLAINED else []:
         if (even := evened(part)) is not None:
             fits = _turned(even.evidence, evidence, more + LEFT_OUT * even.changed)
             own = np.where(evidence.fine & ~part.fine, np.inf, even.own)  # handles stay
             best = min([best, *(replace(fit, own=own) for fit in fits)], key=_length)
     return best
+
+
+def _inner(found: Recognised) -> float:
+    """How far a shape is from what is seen within its outline."""
+    return found.misfit.depth + found.misfit.normal
 
 
 def _turned(part: Evidence, evidence: Evidence, more: float) -> list[Recognised]:
