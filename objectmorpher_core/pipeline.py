@@ -283,6 +283,7 @@ def _carried_out(
             run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
     document, notes = runner.ordered(run.document, others), run.doubts()
+    notes = (*notes, *runner.contradicted(document))
     if any(item.is_moved for item in document.objects) or needs_plate or script.key:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)

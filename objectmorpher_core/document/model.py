@@ -205,6 +205,7 @@ class LiftedObject:
     # the photo; what a change of the thickness leaves where it is. None: it has no such sheet.
     middle: F32 | None = None
     kind: str = ""  # of KINDS, what it was recognised as; empty: nobody looked
+    likeness: float = 1.0  # in [0, 1], to the kind that it was said to be
     # x its size, how far its front is expected to be from where it was put; 0: nobody said
     doubt: float = 0.0
     stands: bool = False  # whether it was seen to stand on something

@@ -152,12 +152,24 @@ def _of_object(
             "control_points": len(lifted.control_points),
             "links": puppet.deformer.graph.link_count,
             "components": puppet.deformer.graph.component_count,
+            "kind": lifted.kind or None,
         },
         "handles": handles,
         "energy": {
             "start": energies[0], "end": energies[-1], "iterations": max(len(energies) - 1, 0),
         },
     }  # fmt: skip
+
+
+def taken_for(document: Document) -> str:
+    """What the turned objects were recognised as, to be appended; empty where nothing plain is."""
+    plain = {"round": "something round", "box": "a box", "flat": "something flat", "tube": "a tube"}
+    told = [
+        f"{item.name} taken for {plain[item.lifted.kind]}"
+        for item in document.objects
+        if item.lifted is not None and item.lifted.kind in plain and any(item.placement.turn)
+    ]
+    return f"; {', '.join(told)}" if told else ""
 
 
 def provenance(result: Composite) -> str:
@@ -173,7 +185,8 @@ def provenance(result: Composite) -> str:
         (shares.from_refiner, "refined"),
     )
     named = ", ".join(f"{share:.0%} {name}" for share, name in parts if share >= 0.005)
-    return f"{result.changed / result.pixels[..., 0].size:.0%} of the photo changed ({named})"
+    share = result.changed / result.pixels[..., 0].size
+    return f"{share:.0%} of the photo changed (of these pixels {named})"
 
 
 def peak_memory_mb() -> float:

@@ -209,6 +209,21 @@ def placed(document: Document, k: int, script: EditScript) -> Document:
     return edits.set_visible(document, k, False) if script.remove else document
 
 
+SAID = {SIGNS[1]: "one should look closely", SIGNS[2]: "it is guesswork"}
+LIKE = 0.3  # likeness, below which a thing does not look like what it was said to be
+SOLIDS = {"round": "something round", "box": "a box"}
+
+
+def contradicted(document: Document) -> tuple[str, ...]:
+    """What does not look like the kind that it was said to be, each a sentence."""
+    return tuple(
+        f"{item.name} does not look like {SOLIDS[item.lifted.kind]}: without saying so"
+        " its shape may come out better"
+        for item in document.objects
+        if item.lifted is not None and item.lifted.kind in SOLIDS and item.lifted.likeness < LIKE
+    )
+
+
 def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
     """What is more guessed than known of the edit, each a sentence."""
     found = []
@@ -217,11 +232,11 @@ def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
         if item.is_moved and item.is_visible:
             splats = puppet.posed(item.pose, item.placement)
             trust = trust_in(splats)
-            if trust.sign == SIGNS[-1] and _is_in_photo(splats.means, document):
+            if trust.sign != SIGNS[0] and _is_in_photo(splats.means, document):
                 is_moved_only = item.pose is None and not any(item.placement.turn)
                 way = "moved" if is_moved_only else "turned"
                 found.append(
-                    f"{item.name} is {way} so far that it is guesswork: the photo does not show"
+                    f"{item.name} is {way} so far that {SAID[trust.sign]}: the photo does not show"
                     f" {trust.invented:.0%} of what is seen of it now"
                 )
     return tuple(found)

@@ -359,3 +359,12 @@ def test_what_is_guesswork_is_said_of_what_is_seen():
     (note,) = _run(turn=[120, 0, 0]).notes
     assert "is turned so far that it is guesswork" in note
     assert _run(move=[3000, 0]).notes == ()
+
+
+@pytest.mark.parametrize("turn", [8, 30, 60, 120])
+def test_what_is_said_of_a_turn_is_what_its_sign_says(turn):
+    edited = _run(turn=[turn, 0, 0])
+    told = {"fine": None, "look closely": "look closely:", "guesswork": "it is guesswork:"}
+    words = told[edited.report()["trust"]["sign"]]
+    assert len(edited.notes) == (words is not None)
+    assert words is None or words in edited.notes[0]

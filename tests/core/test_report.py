@@ -23,7 +23,7 @@ KEYS = {
     "photo": {"width", "height"},
     "trust": {"sign", "risk", "invented", "astray"},
     "object": {"mask_area_px", "gaussians", "edge_gaussians", "control_points", "links",
-               "components"},
+               "components", "kind"},
     "handles": None,
     "energy": {"start", "end", "iterations"},
     "pixels": {"changed", "outside_footprint_changed", "from_photo", "from_lifter",

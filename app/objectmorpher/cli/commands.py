@@ -28,7 +28,7 @@ from objectmorpher_core.scripting.options import (
     script_from,
 )
 from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, Export, encode_output
-from objectmorpher_core.scripting.report import provenance, role_of
+from objectmorpher_core.scripting.report import provenance, role_of, taken_for
 from objectmorpher_core.scripting.runner import refuse_missing
 from objectmorpher_core.scripting.script import BatchItem, beside, read_scripts
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
@@ -176,7 +176,8 @@ def _edit_one(
         sys.stderr.write(f"{PROGRAM}: {out}: {note}\n")
     names = ", ".join(map(str, (out, *extras.values())))
     seconds = edited.stopwatch.read()["total"]
-    return outputs, f"wrote {names} in {seconds:.1f} s: {provenance(edited.composite)}"
+    told = provenance(edited.composite) + taken_for(edited.document)
+    return outputs, f"wrote {names} in {seconds:.1f} s: {told}"
 
 
 def _is_folder(name: str, path: Path) -> bool:
@@ -291,6 +292,7 @@ def describe(document: Document) -> dict[str, Any]:
         objects.append({
             "name": item.name, "role": role_of(document.objects, k),
             "mask_area_px": 0 if item.mask is None else int(item.mask.sum()),
+            "kind": None if lifted is None else lifted.kind or None,
             "gaussians": 0 if lifted is None else len(lifted.body),
             "edge_gaussians": 0 if lifted is None else len(lifted.gaussians) - len(lifted.body),
             "control_points": 0 if lifted is None else len(lifted.control_points),
@@ -422,6 +424,8 @@ def _label(key: str) -> str:
 
 def _line(value: Any) -> str:
     """A figure in words: yes and no, numbers with spaces between them."""
+    if value is None:
+        return "unknown"
     if isinstance(value, dict):
         return ", ".join(f"{_label(k)} {_line(v)}" for k, v in value.items()) or "none"
     if isinstance(value, list):

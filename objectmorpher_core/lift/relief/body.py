@@ -39,6 +39,7 @@ class ReliefBody:
     own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
     behind: Behind | None = None  # what its shape hides from the photo; None: nothing is known
     kind: str = "free"  # what it was recognised as: see `shapes`
+    likeness: float = 1.0  # in [0, 1], to the kind that it was said to be
     solid: PlainSolid | None = None  # what it is where it is nothing but that; None: nowhere
     lacks: F64 = field(default_factory=lambda: np.zeros(2))  # slope: see `lacking`
     doubt: float = 0.0  # x extent, expected error of the front's depth; 0: nobody said

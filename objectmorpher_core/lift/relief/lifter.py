@@ -9,7 +9,7 @@ carries the matte's soft edge.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import cv2
@@ -26,6 +26,7 @@ from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
 from ..shapes import (
     Recognised,
+    Rim,
     closed_ring,
     completed,
     flattened,
@@ -58,6 +59,7 @@ SEAM = 2.0  # x mean spacing: so near to what was hidden nothing of the photo is
 NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of the photo
 NEARNESS_EPS = 1e-3  # variance of colours in [0, 1] that counts as flat
 HIDDEN = 1e-6  # visibility of what faces the photo's camera and something else hides
+FAR = 2.0  # px of the crop, at least, from where an outline would be
 PROFILE = 1.2  # width over height, from which what stands is thought to be seen from the side
 
 Shaper = Callable[[ReliefSilhouette, Camera, LiftSettings, MirrorAxis | None], ReliefBody]
@@ -90,17 +92,20 @@ class ReliefLifter:
         Raises LiftError for an object of fewer than about 25 pixels, and for one that has no depth
         in so wide a view.
         """
-        mask, camera, matte = solid_part(subject.mask, subject.matte), subject.camera, subject.matte
-        is_fringed = mask is not subject.mask
-        subject = replace(subject, mask=mask)
-        area = int(np.count_nonzero(mask))
+        solid = solid_part(subject.mask, subject.matte)
+        is_fringed = solid is not subject.mask
+        subject = replace(subject, mask=solid)
+        area = int(np.count_nonzero(solid))
         if area < LEAST_AREA:
             raise LiftError(f"the object is only {area} pixels, too small to lift")
         progress(0.0, "Inflating the silhouette")
+        sight = self._sight(subject, settings, progress)
+        subject, rough = sight.trimmed(subject)
+        mask, camera, matte = subject.mask, subject.camera, subject.matte
         hidden = _hidden(subject, settings)
         canvas = _canvas(matte, hidden, area, settings.count)
         axis = _axis(canvas, settings)
-        body = self._body(subject, settings, axis, progress)
+        body = self._body(subject, settings, axis, sight, progress)
         outline = body.silhouette
         if not np.isfinite(body.middle[outline.inside]).all():
             raise LiftError("the field of view is too wide for the object to have a depth")
@@ -110,6 +115,8 @@ class ReliefLifter:
         surface, spacing = spread(body, settings.count, band, rng, matte, is_fringed)
         if hidden is not None and hidden.any():
             surface = _unseen(surface, hidden, SEAM * spacing)
+        if rough is not None:  # of which the matte would show what is no part of it
+            surface = surface.select(np.flatnonzero(~(surface.is_brim & _holds(rough, surface.xy))))
         progress(0.7, "Colouring its back")
         is_mirrored = _is_mirrored(body, settings, axis)
         colours = colouring(canvas, outline, spacing, is_mirrored, axis)
@@ -127,34 +134,44 @@ class ReliefLifter:
     def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:
         """The shape alone, on which `lift` spreads its Gaussians."""
         subject = replace(subject, mask=solid_part(subject.mask, subject.matte))
+        sight = self._sight(subject, settings, silent)
+        subject, _ = sight.trimmed(subject)
         area = int(np.count_nonzero(subject.mask))
         canvas = _canvas(subject.matte, _hidden(subject, settings), area, settings.count)
-        return self._body(subject, settings, _axis(canvas, settings), silent)
+        return self._body(subject, settings, _axis(canvas, settings), sight, silent)
+
+    def _sight(self, subject: LiftSubject, settings: LiftSettings, progress: Progress) -> _Sight:
+        """What is seen of it; nothing where it is not to be trusted."""
+        if settings.trust <= 0:
+            return _Sight()
+        progress(0.05, "Looking at its shape")
+        if (seen := self._see(subject.pixels, subject.mask, subject.camera)) is None:
+            return _Sight()
+        # What faces the camera may be a flower; an egg that lies as a plate does looks like
+        # one, and is rarer.
+        rims = rims_of(seen, subject.camera) if settings.kind == "auto" else []
+        is_rim = bool(rims) and rims[0].is_steep
+        shape = closed_ring(seen, rims[0]) if is_rim else recognised(seen, settings.kind)
+        return _Sight(seen, shape, rims if is_rim and shape is None else [])
 
     def _body(
         self,
         subject: LiftSubject,
         settings: LiftSettings,
         axis: MirrorAxis | None,
+        sight: _Sight,
         progress: Progress,
     ) -> ReliefBody:
         mask, camera, hidden = subject.mask, subject.camera, _hidden(subject, settings)
         outline = ReliefSilhouette.of(mask if hidden is None else mask | hidden)
         body = self._shape(outline, camera, settings, axis)
-        if settings.trust > 0:
-            progress(0.05, "Looking at its shape")
-            if (seen := self._see(subject.pixels, mask, camera)) is not None:
-                body = fused(body, seen, camera, settings.thickness, settings.trust)
-                body = replace(body, doubt=seen.doubt)
-                # What faces the camera may be a flower; an egg that lies as a plate does looks like
-                # one, and is rarer.
-                rims = rims_of(seen, camera) if settings.kind == "auto" else []
-                is_rim = bool(rims) and rims[0].is_steep
-                shape = closed_ring(seen, rims[0]) if is_rim else recognised(seen, settings.kind)
-                if is_rim and shape is None:
-                    body = laid(body, rims, seen, subject, settings.thickness)
-                else:
-                    body = _shaped(body, shape, subject, settings)
+        if (seen := sight.seen) is not None:
+            body = fused(body, seen, camera, settings.thickness, settings.trust)
+            body = replace(body, doubt=seen.doubt)
+            if sight.rims:
+                body = laid(body, sight.rims, seen, subject, settings.thickness)
+            else:
+                body = _shaped(body, sight.shape, subject, settings)
         if settings.kind == "tube":
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
@@ -182,6 +199,39 @@ class ReliefLifter:
             limit = np.array(hidden.shape[::-1]) - 1
             cells = hidden[tuple(np.moveaxis(np.clip(at, 0, limit), -1, 0)[::-1])]
         return follow(body, seen, subject.camera.focal, settings.thickness, cells)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """What the network sees of an object, and what that looks like."""
+
+    seen: shape_look.SeenShape | None = None
+    shape: Recognised | None = None
+    rims: list[Rim] = field(default_factory=list)  # of what lies as plates do
+
+    def trimmed(self, subject: LiftSubject) -> tuple[LiftSubject, Mask | None]:
+        """`subject` without what its selection has of the background, and that, (H, W), if any."""
+        if self.seen is None or self.shape is None or self.shape.own is None:
+            return subject, None
+        x0, y0, x1, y1 = subject.matte.box
+        at = np.stack(np.meshgrid(np.arange(x0, x1), np.arange(y0, y1)), -1).astype(np.float64)
+        x, y = np.moveaxis(self.seen.crop.grid_xy(at + 0.5), -1, 0).astype(np.float32)
+        own = self.shape.own.clip(-FAR, FAR).astype(np.float32)
+        beyond = cv2.remap(own, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) < 0
+        alpha = np.where(beyond, 0, subject.matte.alpha).astype(np.float32)
+        rough = np.zeros_like(subject.mask)
+        height, width = rough.shape
+        inner = np.s_[max(-y0, 0) : height - y0, max(-x0, 0) : width - x0]
+        rough[max(y0, 0) : y1, max(x0, 0) : x1] = beyond[inner]
+        matte = replace(subject.matte, alpha=alpha)
+        return replace(subject, mask=subject.mask & ~rough, matte=matte), rough
+
+
+def _holds(mask: Mask, xy: F64) -> Mask:
+    """(N,) whether photo px (N, 2) are in `mask` (H, W)."""
+    limit = np.array(mask.shape[::-1]) - 1
+    x, y = np.clip(np.floor(xy).astype(int), 0, limit).T
+    return mask[y, x]
 
 
 def _shaped(
@@ -330,6 +380,7 @@ def _assemble(
         "relief",
         middle=middle,
         kind=body.kind,
+        likeness=body.likeness,
         stands=body.standing.is_known or body.up is not None,
         doubt=body.doubt,
         up=None if body.up is None else (float(body.up[0]), float(body.up[1]), float(body.up[2])),

@@ -69,7 +69,7 @@ class PrismSides:
             ends = start + side * (np.argmin(beside, axis=1) - 0.5)
             xy = silhouette.photo_xy(np.column_stack([ends, rows]))
             allowed = STRAIGHT * float(np.median(np.abs(xy[:, 0] - middle))) + cell
-            x, lean = _line(xy[:, 1] - row, xy[:, 0], allowed)
+            x, lean = agreed_line(xy[:, 1] - row, xy[:, 0], allowed)
             stray = side * (xy[:, 0] - x - lean * (xy[:, 1] - row))
             if (stray > allowed).mean() > HANDLE_ROWS or (stray < -allowed).mean() > ROUND_ROWS:
                 return None
@@ -112,7 +112,7 @@ def find_prism(silhouette: ReliefSilhouette, camera: Camera, horizon: float | No
     return _box(plan, *contact, row)
 
 
-def _line(t: F64, x: F64, allowed: float) -> tuple[float, float]:
+def agreed_line(t: F64, x: F64, allowed: float) -> tuple[float, float]:
     """Value at t = 0 and slope of the line through two of the points (n,) that most agree with."""
     i, j = np.triu_indices(len(t), len(t) // 4)
     slopes = (x[j] - x[i]) / np.where(t[j] == t[i], 1e-9, t[j] - t[i])

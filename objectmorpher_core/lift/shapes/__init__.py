@@ -9,10 +9,10 @@ most gives the object's front and back as far as it explains them; the rest stay
 from __future__ import annotations
 
 from .recognition import Recognised, closed_ring, completed, flattened, recognised, rounded
-from .rims import rims_of
+from .rims import Rim, rims_of
 from .tableware import laid
 
 __all__ = [
-    "Recognised", "closed_ring", "completed", "flattened", "laid", "recognised", "rims_of",
+    "Recognised", "Rim", "closed_ring", "completed", "flattened", "laid", "recognised", "rims_of",
     "rounded",
 ]  # fmt: skip

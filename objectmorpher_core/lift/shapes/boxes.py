@@ -63,14 +63,7 @@ STEPS = np.array([0.15, 0.15, 0.15, 0.03, 0.03, 0.03, 0.15, 0.15, 0.15])
 
 def fit_box(evidence: Evidence) -> tuple[Mesh, Misfit]:
     """The best of boxes that were refined from different rotations."""
-    turns, scores = _turns(evidence)
-    kept: list[Rotation] = []
-    for k in np.argsort(-scores):
-        if all(_between(turns[k], other) > APART for other in kept):
-            kept.append(turns[k])
-        if len(kept) == TRIED:
-            break
-    guesses = [_guess(turn, evidence) for turn in [*kept, *_upright(evidence)]]
+    guesses = _guesses(evidence)
     guesses.sort(key=lambda guess: evidence.misfit(guess(np.zeros(9))).total)
     fits = [refined(guess, np.zeros(9), STEPS, evidence) for guess in guesses[:KEPT]]
     best = int(np.argmin([misfit.total for _, misfit in fits]))
@@ -78,6 +71,27 @@ def fit_box(evidence: Evidence) -> tuple[Mesh, Misfit]:
     finer = guesses[best](_outlined(guesses[best], fits[best][0], evidence))
     is_better = (found := evidence.misfit(finer)).total < misfit.total + WORSE
     return (finer, found) if is_better else (mesh, misfit)
+
+
+def fit_about(evidence: Evidence) -> tuple[Mesh, Misfit]:
+    """The box about what is seen, whatever its outline: a thing that is none has the outline of
+    boxes that are nothing like it.
+    """
+    meshes = [guess(np.zeros(9)) for guess in _guesses(evidence)]
+    fits = [(mesh, evidence.misfit(mesh)) for mesh in meshes]
+    return min(fits, key=lambda fit: fit[1].depth + fit[1].normal)
+
+
+def _guesses(evidence: Evidence) -> list[Build]:
+    """Boxes about what is seen, of rotations that differ."""
+    turns, scores = _turns(evidence)
+    kept: list[Rotation] = []
+    for k in np.argsort(-scores):
+        if all(_between(turns[k], other) > APART for other in kept):
+            kept.append(turns[k])
+        if len(kept) == TRIED:
+            break
+    return [_guess(turn, evidence) for turn in [*kept, *_upright(evidence)]]
 
 
 def _outlined(build: Build, start: F64, evidence: Evidence) -> F64:

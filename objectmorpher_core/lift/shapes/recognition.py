@@ -17,8 +17,9 @@ from ..relief.plain_solid import PlainSolid
 from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
-from .boxes import fit_box, fit_flat
+from .boxes import fit_about, fit_box, fit_flat
 from .evidence import Evidence, Misfit
+from .lathe import evened
 from .rims import Rim
 from .rods import Axis, AzimuthOf, TurnedBody
 from .round import fit_closed_ring, fit_ellipsoid, fit_revolution, fit_ring
@@ -66,6 +67,8 @@ class Recognised:
     mesh: Mesh | None = None
     plane: F64 | None = None  # (3,) of a sheet: see `flats`
     description: float = 0.0  # length, of a solid
+    likeness: float = 1.0  # how much it would be believed if the artist did not say so
+    own: F64 | None = None  # (s, s) px of the crop: negative where its selection is none of it
 
     @property
     def up(self) -> F64 | None:
@@ -164,7 +167,10 @@ def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:
         return None
     if kind != "auto":
         found = _sheet(evidence) if kind == "flat" else _solid(kind, evidence)
-        return replace(found, weight=1.0)
+        likeness = found.weight
+        if kind == "box" and likeness < LEAST:
+            found = _described(kind, fit_about(evidence.core()), evidence, 0.0)
+        return replace(found, weight=1.0, likeness=likeness)
     odds = seen.flatness + (RECTANGLE if evidence.is_four_cornered else 0.0) - FLAT
     if odds >= SIDED:
         return _sheet(evidence)
@@ -196,17 +202,34 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
     if (ring := fit_ring(core)) is not None:
         return _described(kind, ring, evidence, left_out)
     fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
-    # A foot on a thin stem is no handle: what is not surely round without its thin parts is
-    # looked at with them.
-    looks = [(core, left_out, EXPLAINED)] + [(evidence, 0.0, WHOLE)] * (left_out > STEM)
-    for part, more, enough in looks:
-        if (
-            max(fit.weight for fit in fits) < enough
-            and (turned := fit_revolution(part)) is not None
-        ):
-            more += PROFILE[0] + PROFILE[1] * float(np.log1p(turned[2]))
-            fits.append(_described(kind, turned[:2], evidence, more))
-    return min(fits, key=_length)
+    if fits[0].weight < EXPLAINED:
+        fits += _turned(core, evidence, left_out)
+    best, looks = min(fits, key=_length), [(core, left_out)]
+    if left_out > STEM:  # a vase's neck, or a foot on a thin stem, is no handle
+        looks.append((evidence, 0.0))
+        for whole in _turned(evidence, evidence, 0.0):
+            # How it leans says what is seen within its outline, not that it is longer.
+            is_known = best.weight >= WHOLE and _inner(whole) > _inner(best)
+            best = best if is_known else min(best, whole, key=_length)
+    for part, more in looks if best.weight < EXPLAINED else []:
+        if (even := evened(part)) is not None:
+            fits = _turned(even.evidence, evidence, more + LEFT_OUT * even.changed)
+            own = np.where(evidence.fine & ~part.fine, np.inf, even.own)  # handles stay
+            best = min([best, *(replace(fit, own=own) for fit in fits)], key=_length)
+    return best
+
+
+def _inner(found: Recognised) -> float:
+    """How far a shape is from what is seen within its outline."""
+    return found.misfit.depth + found.misfit.normal
+
+
+def _turned(part: Evidence, evidence: Evidence, more: float) -> list[Recognised]:
+    """The best surface of revolution for a `part` of the evidence, if there is any."""
+    if (turned := fit_revolution(part)) is None:
+        return []
+    more += PROFILE[0] + PROFILE[1] * float(np.log1p(turned[2]))
+    return [_described("round", turned[:2], evidence, more)]
 
 
 def _described(
@@ -276,6 +299,7 @@ def completed(
     sides = [side.towards(thickness * half, share) for side in (body.front, body.back)]
     middle = body.middle + share * (near - half - body.middle)
     body = replace(body, middle=middle, front=sides[0], back=sides[1], kind=shape.kind)
+    body = replace(body, likeness=shape.likeness)
     body = replace(body, up=body.up if shape.up is None else shape.up)
     own = (share > ALONE) & places.is_near & (thickness == 1)
     body = replace(_whole(body, share), solid=_solid_of(shape, own, away, camera))
@@ -291,7 +315,7 @@ def _solid_of(shape: Recognised, own: Mask, away: float, camera: Camera) -> Plai
 
     `away`: the logarithm of its size in px.
     """
-    if shape.mesh is None or shape.kind != "box" or not own.any():
+    if shape.mesh is None or shape.kind != "box" or shape.likeness < LEAST or not own.any():
         return None
     return PlainSolid(np.exp(away) * shape.mesh.vertices, shape.mesh.faces, camera, own)
 

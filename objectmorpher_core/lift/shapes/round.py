@@ -15,7 +15,7 @@ import numpy as np
 from ...base.arrays import F64, Mask
 from ...base.masks import largest_piece
 from .evidence import HOPELESS, STRIDE, Evidence, Misfit, least
-from .lathe import FINER, PLACES, Lathe, Profile
+from .lathe import FINER, PLACES, Lathe, Profile, ways_of
 from .solids import AROUND, FINE, Mesh, drawn, ellipsoid, tube
 
 # A ring that looks like the photo: a round tube about an axis, as a doughnut, a tyre, a bracelet.
@@ -157,7 +157,6 @@ LEANS = np.radians([4.0, 15.0, 28.0, 42.0, 58.0, 74.0])  # of the axis from the 
 STEEPEST = 1.5  # radians, likewise
 STEPPED = 0.3  # misfit that more places on the axis explain, where the profile has steps
 SIMPLER = 1.0  # misfit that a radian of a profile's bend outweighs
-ALIKE = 0.998  # cosine between two axes that are tried as one
 ROUNDER = 0.5  # misfit that an ellipsoid outweighs, odd in depth by one of its steps
 KEPT = 2  # leanings that are refined
 LEAST_SHARE = 0.6  # of the mask, that is alike on both sides
@@ -271,16 +270,8 @@ def _lathes(evidence: Evidence) -> list[Lathe]:
     """About the axes of the mask; what sticks out on one side only is left out."""
     at = evidence.grid.tangents
     mean = at[evidence.mask].mean(0)
-    _, axes = np.linalg.eigh(np.cov((at[evidence.mask] - mean).T))
-    corners = cv2.boxPoints(cv2.minAreaRect(evidence.outline.astype(np.float32)))
-    sides = [corners[k + 1] - corners[k] for k in (0, 1)]
-    sides = [side / max(float(np.linalg.norm(side)), 1e-9) for side in sides]
-    ways = [axes[:, 0], axes[:, 1], np.array([0.0, 1.0]), *sides]
     found: list[Lathe] = []
-    for way in ways:
-        way = way * np.sign(way[1] + 1e-9)
-        if any(abs(way @ other.along) > ALIKE for other in found):
-            continue
+    for way in ways_of(evidence):
         middle = _axis_of(evidence.mask, at, mean, way)
         mirrored = largest_piece(_both_sides(evidence, middle, way))
         if mirrored.sum() < LEAST_SHARE * evidence.mask.sum():
