@@ -17,7 +17,7 @@ from ...base.kernel_files import numba
 from ...base.masks import box_of, dilated, disc
 from ...base.poisson_disk import distance_inside
 from ...document.model import Matte
-from ...segment.matting.matte import band_width, extended_mask, frame_extension
+from ...segment.matting.matte import band_width, extended_mask, frame_extension, is_large
 from .canvas import bilinear
 
 GRID = 256  # cells on the longer side of the box
@@ -270,6 +270,8 @@ def solid_part(mask: Mask, matte: Matte) -> Mask:
     where there is nothing else.
     """
     band = band_width(mask.shape[1], mask.shape[0])
+    if not is_large(mask, band):
+        return mask
     box = box_of(mask, int(3 * band) + 2)
     window = np.s_[box[1] : box[3], box[0] : box[2]]
     part, alpha, spot = mask[window], crop(matte.alpha, matte.box, box), disc(int(np.ceil(band)))

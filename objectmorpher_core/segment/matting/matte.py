@@ -25,6 +25,7 @@ from .unmix import Unmixed, coarse_colours, unmixed
 BAND = 0.0040  # x the photo's diagonal: how far a mask's edge may be off, about
 MIN_BAND = 2.0  # px
 REACH = 4.0  # x band: how far from the mask's edge alpha may be soft
+LARGE = 24.0  # x band: the square root of an object's area, from which it may be
 TRUST = 0.1  # in a mask where its edge was found to be farther off
 MARGIN = 4.0  # x band, kept around the object in the crop
 LOOKED = 4  # px from the frame, at least, over which a run's width is seen to change
@@ -200,8 +201,11 @@ def _far(
 ) -> tuple[tuple[int, int, int, int], Mask] | None:
     """A box with more of the extended photo around, and where in it the edge may be farther off.
 
-    Near what an artist drew soft, or brushed, it is not.
+    Near what an artist drew soft, or brushed, it is not; nor is it of what is small, which a wide
+    band would be half of.
     """
+    if not is_large(is_selected(mask), band):
+        return None
     box = box_of(mask, int(np.ceil((STRAY * REACH + MARGIN) * band)))
     window = np.s_[box[1] : box[3], box[0] : box[2]]
     part = extended_part(pixels, extension, window)
@@ -212,6 +216,11 @@ def _far(
     if found is not None and drawn.any():
         found &= ~grow(drawn, STRAY * REACH * band)
     return (box, found) if found is not None and found.any() else None
+
+
+def is_large(mask: Mask, band: float) -> bool:
+    """Whether an object is so large that hair about it may be wider than `band` px and be seen."""
+    return bool(np.sqrt(np.count_nonzero(mask)) >= LARGE * band)
 
 
 def soft_cutout(
