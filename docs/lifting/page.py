@@ -100,7 +100,11 @@ were the surface's: its rim stood on the mask's steps of a pixel, its points fil
 cells, and its normals there were those of steps. Now rims lie where the matte is half covered,
 sheets end there, walls have the rim's normals, and a recognised shape goes on beyond where its own
 picture ends. At turn 20, turn 35 and pitch 20 the wobble of the ten was 1.32, 1.42 and 1.36 before,
-and 1.40, 1.41 and 1.63 of those held out. What is left of box and brick is at hidden corners.
+and 1.40, 1.41 and 1.63 of those held out. What was left of box and brick was at
+hidden corners, and at sides of which the photo shows a sliver: a pixel there is ten on the side.
+Since the front of a recognised box lies on the box, too, and rows of points along its edges are
+straight wherever they are, a pitch of the brick by 20 degrees bends 1.35 times as much as the truth
+(1.93 before), of the box 1.37 (1.62), of the domino, held out, 2.05 (2.08).
 
 What sticks out of a surface of revolution and is thin, a handle or a spout, is a round rod in a
 plane through the axis. How that plane lies about the axis the shape network does not see: of

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from PIL import Image, ImageCms, ImageShow
+from scipy import ndimage
 
 import objectmorpher_core as om
 from objectmorpher import __version__
@@ -132,7 +133,9 @@ def test_a_photo_may_be_a_path_bytes_an_array_or_an_image_of_pillow(folder):
         assert photo.picture.is_grey and photo.pixels.shape == PIXELS.shape
     assert opened[12].pixels.dtype == np.uint16
     result = om.open(photos[9]).mask(MASK).options(**QUICK).turn(20).render()
-    assert np.array_equal(result.to_numpy()[..., 3], alpha), "alpha is kept as it is"
+    found, beside = result.to_numpy()[..., 3], ndimage.distance_transform_edt(~MASK)
+    assert np.array_equal(found[beside > 20], alpha[beside > 20])
+    assert (found[ndimage.binary_erosion(MASK, iterations=12)] == 255).all()
     assert result.to_pil().mode == "RGBA"
     om.replay(result.encode(".omorph", "session"))  # what was opened can be kept
 

@@ -176,8 +176,10 @@ def test_an_edit_leaves_what_is_far_from_it_to_the_last_bit(folder, kind):
     assert _edit("--move", "6,0", photo="any.png") == 0
     back = cv2.imread("out.png", cv2.IMREAD_UNCHANGED)
     assert back.dtype == photo.dtype
-    away = cv2.distanceTransform((~MASK).astype(np.uint8), cv2.DIST_L2, 5) > 20
-    assert np.array_equal(back[away], photo[away])
+    # In an alpha of noise, clear ground is everywhere, and a fringe beside it is the object's.
+    far = 40 if kind.startswith("alpha") else 20
+    away = cv2.distanceTransform((~MASK).astype(np.uint8), cv2.DIST_L2, 5) > far
+    assert away.any() and np.array_equal(back[away], photo[away])
     assert not np.array_equal(back[MASK], photo[MASK])
 
 

@@ -17,7 +17,7 @@ from ...base.kernel_files import numba
 from ...base.masks import box_of, dilated, disc
 from ...base.poisson_disk import distance_inside
 from ...document.model import Matte
-from ...segment.matting.matte import band_width, extended_mask, frame_extension, is_large
+from ...segment.matting.matte import REACH, band_width, extended_mask, frame_extension, is_large
 from .canvas import bilinear
 
 GRID = 256  # cells on the longer side of the box
@@ -280,7 +280,9 @@ def solid_part(mask: Mask, matte: Matte) -> Mask:
     )
     gaps = _opened(part & (share < SOLID * whole), spot)
     pieces, area = _pieces(gaps)
-    is_gap = (_pieces_in(pieces, alpha < 0.5) > HOLLOW * area) & (area > LEAST * band**2)
+    away = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
+    deep = _pieces_in(pieces, away > REACH * band) > 0  # elsewhere an edge is never so far off
+    is_gap = deep & (_pieces_in(pieces, alpha < 0.5) > HOLLOW * area) & (area > LEAST * band**2)
     gaps = is_gap[pieces]
     if not gaps.any():
         return mask

@@ -208,7 +208,7 @@ def test_putting_back_the_order_of_depth_needs_no_layers():
 
 def test_a_copy_at_rest_changes_nothing():
     document = edits.duplicate(_two_discs(), 0)
-    assert [o.name for o in document.objects] == ["Object 1", "Right", "Object 2"]
+    assert [o.name for o in document.objects] == ["Object 1", "Right", "Object 1 copy"]
     assert document.objects[2].lifted is document.objects[0].lifted
     assert document.plate is _two_discs().plate
     assert np.array_equal(composite(document).pixels, document.photo.pixels)
@@ -254,7 +254,7 @@ def test_removing_an_object_takes_the_plate_unless_a_copy_stays():
     document = edits.duplicate(_two_discs(), 0)
     one = edits.remove_object(document, 0)
     assert one.plate is document.plate
-    assert [o.name for o in one.objects] == ["Right", "Object 2"]
+    assert [o.name for o in one.objects] == ["Right", "Object 1 copy"]
     assert edits.remove_object(one, 1).plate is None
 
 
@@ -262,6 +262,6 @@ def test_names_can_be_changed_but_not_be_empty():
     document = edits.rename(_two_discs(), 0, "  Cat 3 ")
     assert document.objects[0].name == "Cat 3"
     assert document.plate is not None
-    assert edits.duplicate(document, 0).objects[2].name == "Cat 2"
+    assert edits.duplicate(document, 0).objects[2].name == "Cat 3 copy"
     with pytest.raises(edits.EditError, match="name"):
         edits.rename(document, 0, " ")

@@ -336,16 +336,20 @@ def test_a_box_is_as_its_outline_says_where_the_network_errs(turn) -> None:
     assert aligned.min() > np.cos(np.radians(6.0))
 
 
-@pytest.mark.parametrize("turn", TURNS)
-def test_the_hidden_sides_of_a_box_lie_on_it_and_have_no_gaps(turn) -> None:
-    mesh = box(AT, turn_matrix(*turn).T, np.array([0.22, 0.3, 0.15]))
-    seen, _ = see(mesh)
+def box_body(turn: tuple[float, float, float]) -> tuple[ReliefBody, PlainSolid, Camera]:
+    """The body of a box that is recognised, as it is turned."""
+    seen, _ = see(box(AT, turn_matrix(*turn).T, np.array([0.22, 0.3, 0.15])))
     body, camera = body_of(seen)
     found = recognised(seen)
     assert found is not None
     body = completed(fused(body, seen, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
-    solid = body.solid
-    assert solid is not None
+    assert body.solid is not None
+    return body, body.solid, camera
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_the_hidden_sides_of_a_box_lie_on_it_and_have_no_gaps(turn) -> None:
+    body, solid, camera = box_body(turn)
     surface, spacing = spread(body, 3000, 2.0, np.random.default_rng(0))
     depth = camera.focal - surface.height
     places = camera.unproject(surface.xy, depth)
@@ -371,14 +375,7 @@ def test_the_hidden_sides_of_a_box_lie_on_it_and_have_no_gaps(turn) -> None:
 
 @pytest.mark.parametrize("turn", TURNS)
 def test_rows_beside_a_box_s_edges_are_straight_and_nothing_sticks_out_of_them(turn) -> None:
-    mesh = box(AT, turn_matrix(*turn).T, np.array([0.22, 0.3, 0.15]))
-    seen, _ = see(mesh)
-    body, camera = body_of(seen)
-    found = recognised(seen)
-    assert found is not None
-    body = completed(fused(body, seen, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
-    solid = body.solid
-    assert solid is not None
+    body, solid, camera = box_body(turn)
     surface, spacing = spread(body, 3000, 2.0, np.random.default_rng(0))
     points = np.column_stack([surface.xy, surface.height])[surface.is_seen & ~surface.is_brim]
     places = camera.unproject(points[:, :2], camera.focal - points[:, 2])
