@@ -222,9 +222,9 @@ cup's limb are small jags, and a nib where the spoon touches the lip; its handle
 on the saucer. Up to 25 degrees the flower, the rocket, the bowl, the coins and the logo look right,
 the astronaut nearly so: her head is a little deep, and what is not shown of her neck is uneven. The
 horse is a sheet, as it was drawn. What does not look right: the cat's fur at the upper
-left is coarse; the fig in the bowl becomes narrow, and slides at 35, where a strand stands off the
-bowl's edge; the photographer's back has a grey band; the clock, which is blurred, has a double
-edge, and the cell, which is blurred too, a hard one where its side turns into view; the retina
+left is coarse; the side of the bowl that turns into view is drawn out at 35; the photographer's
+back has a grey band; the clock, which is blurred, has a nub at its left, for its edge is taken for
+hair, and the cell, which is blurred too, a hard one where its side turns into view; the retina
 shows its dark spot a second time at its left; the colour ball is black at the frame, and has bands,
 nicks and specks there; the pagoda leans, becomes narrow at 35, and shows light spots at its left
 windows; of the moon a piece of ground is selected, which has a ragged edge.
