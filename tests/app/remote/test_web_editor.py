@@ -24,7 +24,7 @@ from objectmorpher_core.base.rotations import quats_from_matrices
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Document, Placement
-from objectmorpher_core.document.placement import gimbal_of, placement_of
+from objectmorpher_core.document.placement import placement_of
 from objectmorpher_core.session.file import decode_session
 from tests import shapes
 from tests.browser import Browser, opened_browser
@@ -188,8 +188,7 @@ def test_an_edit_by_http_gives_the_very_pixels_of_the_command_line(
     item, camera = document.objects[0], document.photo.camera
     assert item.lifted is not None
     rest = puppet_of(item, camera).deformer.points
-    turn = gimbal_of(item, document).turn((20.0, 0.0, 0.0))  # about its own upright
-    motion = Placement(turn=turn).matrix(item.lifted, camera)
+    motion = Placement(turn=(20.0, 0.0, 0.0)).matrix(item.lifted, camera)
     motion = motion @ item.lifted.world_from_object
     question = {
         "what": "photo", "points": base64.b64encode(rest.astype("<f4").tobytes()).decode(),
