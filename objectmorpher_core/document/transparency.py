@@ -157,15 +157,11 @@ def continued(picture: Picture, covered: Mask) -> Pixels:
 
 def _nearest(image: np.ndarray, known: Mask) -> np.ndarray:
     """`image` (h, w, ...) where it is `known` (h, w); elsewhere as at the nearest such place."""
+    from ..base.poisson_disk import nearest_in  # it needs the compiler
+
     if not known.any():
         return image
-    _, found = cv2.distanceTransformWithLabels(
-        (~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    labels = np.asarray(found, np.int32)
-    values = np.zeros((int(labels.max()) + 1, *image.shape[2:]), image.dtype)
-    values[labels[known]] = image[known]
-    return values[labels]
+    return image.reshape(-1, *image.shape[2:])[nearest_in(known)]
 
 
 def on_checker(
