@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 import numpy as np
-from PIL import ImageCms
 
 from . import decode_apart, tiff
 
@@ -29,7 +28,6 @@ DNG_VERSION, PHOTOMETRIC, SUB_IFDS = 50706, 262, 330
 OF_A_SENSOR = (32803, 34892)  # photometric: a colour filter array, linear RAW
 MOST_ENTRIES = 4096  # of all directories of a file that are looked at
 PACKAGES = {"HEIC": "pi_heif", "JPEG XL": "pylibjxl", "camera RAW": "rawpy"}
-SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 SECONDS = 180  # that a decoder has; a RAW file of 100 megapixels takes 30
 MOST_LOGGED = 2000  # characters
 EFFORT = 4  # of JPEG XL's encoder, of 9; 7 takes three times as long for 3 % less
@@ -86,8 +84,15 @@ def read(kind: str, data: bytes, most: int) -> Guest:
     behind = rest[count * dtype.itemsize :]
     icc, block = behind[: about["icc"]], behind[about["icc"] :]
     if kind == "camera RAW":
-        icc, block = SRGB, tiff.described_raw(data) or b""
+        icc, block = _srgb(), tiff.described_raw(data) or b""
     return Guest(samples, icc or None, block or None)
+
+
+def _srgb() -> bytes:
+    """The colour profile of sRGB."""
+    from PIL import ImageCms
+
+    return ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 
 
 def encode_jxl(samples: np.ndarray, icc: bytes | None, exif: bytes | None, quality: int) -> bytes:

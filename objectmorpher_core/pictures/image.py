@@ -11,16 +11,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-from PIL import Image, ImageCms
 
 from ..base.arrays import RGB, U8, Mask, Pixels, freeze
 from ..base.library_output import logged_output
 from ..base.limits import PICTURE_PIXELS as MAX_PIXELS
 from . import exif, guests, png, tiff
 from .formats import FLAT, READABLE, endings_of
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 # Pictures that are no files: arrays and Pillow's images, in and out of a `Picture`.
 
@@ -80,7 +83,7 @@ def pil_of(picture: Picture) -> Image.Image:
         colours = to_u8(colours)
     if picture.alpha is not None:
         colours = np.dstack([colours, to_u8(picture.alpha)])
-    image = Image.fromarray(colours)
+    image = _pillow(colours)
     known = {"icc_profile": picture.icc, "exif": picture.exif}
     image.info.update({key: value for key, value in known.items() if value})
     return image
@@ -97,8 +100,6 @@ AVIF_SPEED = 8  # of 10; 6 takes three times as long for 3 % less
 REASON = 200  # characters of what a decoder says
 COLOURED = 4  # levels of 255 between channels, from which on a grey photo has got colour
 LOSSLESS = 100  # quality of WebP that keeps every pixel
-
-Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard, which fires before ours in some formats
 
 
 class ImageError(ValueError):
@@ -144,6 +145,9 @@ def read_picture(data: bytes, most: int = MAX_PIXELS) -> Picture:
 def _read(data: bytes, most: int) -> Picture:
     if (kind := guests.kind_of(data)) is not None:
         return _read_guest(kind, data, most)
+    from PIL import Image  # 40 ms that the first picture needs, not the program's start
+
+    Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard, before ours in some formats
     try:
         image = Image.open(io.BytesIO(data), formats=FORMATS)
     except Image.DecompressionBombError:
@@ -218,6 +222,8 @@ def _read_8_bit(image: Image.Image | None) -> Picture:
 
 def _through_profile(image: Image.Image) -> Image.Image:
     """A CMYK or Lab image as sRGB, through its own profile where it has one."""
+    from PIL import ImageCms
+
     source = ImageCms.createProfile("LAB") if image.mode == "LAB" else None
     if icc := image.info.get("icc_profile"):
         source = io.BytesIO(icc)
@@ -343,6 +349,12 @@ def _has_colour(pixels: Pixels) -> bool:
     return any(int(cv2.absdiff(a, b).max(initial=0)) > least for a, b in pairs)
 
 
+def _pillow(samples: np.ndarray) -> Image.Image:
+    from PIL import Image
+
+    return Image.fromarray(samples)
+
+
 def _grey(pixels: Pixels) -> np.ndarray:
     """(H, W) luma; exactly the grey that all three channels share where they do."""
     return cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
@@ -355,7 +367,7 @@ def _encode_jpeg(picture: Picture, quality: int) -> bytes:
     if max(width, height) > JPEG_MAX_SIDE:
         raise ImageError(f"JPEG cannot hold {width} x {height} px; choose .png or .tif")
     pixels = to_u8(picture.pixels)
-    image = Image.fromarray(_grey(pixels) if picture.is_grey else pixels)
+    image = _pillow(_grey(pixels) if picture.is_grey else pixels)
     out = io.BytesIO()
     profile = _profile_for(picture, 1 if picture.is_grey else 3)
     block = exif.PREFIX + picture.exif if picture.exif else b""
@@ -369,7 +381,7 @@ def _encode_webp(picture: Picture, quality: int) -> bytes:
         raise ImageError(f"WebP cannot hold {width} x {height} px; choose .png or .tif")
     out = io.BytesIO()
     how = {"lossless": True} if quality >= LOSSLESS else {"quality": quality}
-    Image.fromarray(_colours_and_alpha(picture)).save(
+    _pillow(_colours_and_alpha(picture)).save(
         out, "WEBP", **how, exact=True,  # exact: colours under transparency stay
         icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
     )  # fmt: skip
@@ -381,7 +393,7 @@ def _encode_avif(picture: Picture, quality: int) -> bytes:
     if max(width, height) > AVIF_MAX_SIDE:
         raise ImageError(f"AVIF cannot hold {width} x {height} px; choose .png or .tif")
     out = io.BytesIO()
-    Image.fromarray(_colours_and_alpha(picture)).save(
+    _pillow(_colours_and_alpha(picture)).save(
         out, "AVIF", quality=quality, subsampling="4:4:4", speed=AVIF_SPEED,
         icc_profile=_profile_for(picture, 3) or b"", exif=_exif_for_avif(picture.exif),
     )  # fmt: skip
@@ -390,6 +402,8 @@ def _encode_avif(picture: Picture, quality: int) -> bytes:
 
 def _exif_for_avif(block: bytes | None) -> bytes:
     """The block, which Pillow takes apart for AVIF; empty where it is too damaged for that."""
+    from PIL import Image
+
     found = Image.Exif()
     try:
         found.load(block or b"")

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-from PIL import Image
-from PIL.TiffTags import LONG, SHORT, UNDEFINED
 
 from ..base.arrays import PixelSource
 
 if TYPE_CHECKING:
+    from PIL import Image
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 MARKS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # classic and BigTIFF
+SHORT, LONG, UNDEFINED = 3, 4, 7  # types of a tag's values
 ASSOCIATED_ALPHA = 1
 WHITE_IS_ZERO, BLACK_IS_ZERO, RGB = 0, 1, 2
 DEFLATE, HORIZONTAL_DIFFERENCES = 8, 2
@@ -158,6 +158,8 @@ def described_raw(data: bytes) -> bytes | None:
 
 def _described_by(exif: bytes | None) -> ImageFileDirectory_v2:
     """A directory with what an EXIF block says, which is nothing where it cannot be read."""
+    from PIL import Image
+
     if exif:
         try:
             source, fields = Image.Exif(), _directory()

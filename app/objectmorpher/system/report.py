@@ -6,7 +6,6 @@ import getpass
 import os
 import platform
 import re
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from .. import __version__
@@ -29,6 +28,8 @@ def report(folder: Path) -> str:
 
 
 def _version(package: str) -> str:
+    from importlib.metadata import PackageNotFoundError, version  # 10 ms
+
     try:
         return version(package)
     except PackageNotFoundError:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
-from PIL import Image
 
 from ...commands import run
 from ...editor.editor import Editor
@@ -122,6 +121,8 @@ class StartScreen:
 
     def _thumb(self, name: str) -> PictureTexture:
         """The sample's picture, cut to the thumbnail's shape."""
+        from PIL import Image
+
         if name not in self._thumbs:
             with Image.open(str(resource(f"assets/samples/{name}.jpg"))) as file:
                 picture = file.convert("RGB")

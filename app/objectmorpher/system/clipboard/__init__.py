@@ -17,8 +17,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from PIL import Image
-
 from . import x11
 
 # The clipboards of Windows and macOS.
@@ -75,6 +73,8 @@ def _set(user: Any, kernel: Any, kind: int, data: bytes) -> None:
 
 def _dib(png: bytes) -> bytes:
     """The picture on white, as a BMP file without its first header."""
+    from PIL import Image
+
     picture = Image.open(io.BytesIO(png)).convert("RGBA")
     ground = Image.new("RGBA", picture.size, "white")
     out = io.BytesIO()
