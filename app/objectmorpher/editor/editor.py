@@ -110,7 +110,7 @@ class Editor(EditorState):
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
             self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
-            self.leaving_out.poll, self.old_shadows.poll,
+            self.leaving_out.poll, self.old_shadows.poll, self.filing.poll,
         )  # fmt: skip
 
     def _ask_elsewhere(self) -> None:
