@@ -199,14 +199,17 @@ def select(
     script: EditScript,
     mask: bytes | None = None,
     progress: Progress = silent,
-    stopwatch: Stopwatch | None = None,
+    use_confidence: Callable[[float | None], object] | None = None,
 ) -> Document:
     """The document with the script's object chosen; the bytes of a `mask` picture win.
 
+    `use_confidence` gets how sure that is, see `segment.Found`; None of a mask of one's own.
     Raises SelectionError, ImageError, EditError or ScriptError.
     """
-    run = _Run(document, stopwatch or Stopwatch())
-    run.choose(script, mask, progress)
+    run = _Run(document, Stopwatch())
+    sure = run.choose(script, mask, progress)
+    if use_confidence is not None:
+        use_confidence(sure)
     return run.document
 
 
@@ -364,11 +367,12 @@ class _Run:
                 document = set_decontaminate(document, k, script.decontaminate)
             self.document = document
 
-    def choose(self, script: EditScript, mask: bytes | None, progress: Progress) -> None:
-        """The next object is the one that the script means."""
+    def choose(self, script: EditScript, mask: bytes | None, progress: Progress) -> float | None:
+        """The next object is the one that the script means. Returns how sure that is."""
         prompt = prompt_of(script)
         if mask is None and prompt.is_empty:
             raise ScriptError("no object is chosen: use click, box, subject or mask")
+        sure: float | None = None
         with self.stopwatch.stage("segment"):
             if mask is not None:
                 found: Selection = read_coverage(mask, self.document.photo.size)
@@ -377,10 +381,11 @@ class _Run:
                 reading = self._reading(script.segment, part(progress, 0.0, 0.6))
                 wanted = edits.beside(self.document, len(self.document.objects), prompt)
                 got = reading.segment(wanted, part(progress, 0.6, 1.0), script.seed)
-                found, backend = got.mask, got.backend
+                found, backend, sure = got.mask, got.backend, got.confidence
         k = len(self.document.objects)
         document = edits.set_mask(edits.add_object(self.document), k, found, prompt)
         self.document = document.with_backend("segment", backend)
+        return sure
 
     def keep_fronts(self, script: EditScript, progress: Progress) -> None:
         """Keep the things of the script's `front` clicks and mask in front."""

@@ -270,9 +270,12 @@ def test_a_value_with_a_space_is_the_value_with_an_equals_sign(folder):
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
 
 
-def test_selecting_writes_the_mask(folder):
+def test_selecting_writes_the_mask_and_says_what_it_is(folder, capsys):
     assert cli.main(["select", "photo.png", "-o", "s.png", "--click", "78,62",
                      "--segment", "grabcut"]) == 0  # fmt: skip
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert re.fullmatch(r"wrote s\.png in \d+\.\d s: \d+% of the photo selected\n", said.out)
     found = cv2.imread("s.png", cv2.IMREAD_UNCHANGED)
     assert set(np.unique(found)) == {0, 255}
     overlap = ((found > 0) & MASK).sum() / ((found > 0) | MASK).sum()

@@ -11,6 +11,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from objectmorpher_core.base.arrays import Mask
 from objectmorpher_core.base.files import read_input, write_all
 from objectmorpher_core.base.progress import Progress
@@ -28,9 +30,10 @@ from objectmorpher_core.scripting.options import (
     script_from,
 )
 from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, Export, encode_output
-from objectmorpher_core.scripting.report import provenance, role_of, taken_for
+from objectmorpher_core.scripting.report import Stopwatch, provenance, role_of, taken_for
 from objectmorpher_core.scripting.runner import refuse_missing
 from objectmorpher_core.scripting.script import BatchItem, beside, read_scripts
+from objectmorpher_core.segment import UNSURE
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 from objectmorpher_core.splat_files.meshes.textured import plain_glb
@@ -218,11 +221,31 @@ def run_select(options: argparse.Namespace) -> None:
     inputs = [options.photo, *([Path(script.mask)] if script.mask else [])]
     check_outputs(inputs, {options.out: (".png",)})
     refuse_missing(script)
-    mask = read_input(Path(script.mask)) if script.mask else None
+    given = read_input(Path(script.mask)) if script.mask else None
+    sureness: list[float | None] = []
+    stopwatch = Stopwatch()
     with progress_bar("Selecting") as progress:
         document = open_photo(read_input(options.photo), options.photo.name)
-        document = select_object(document, script, mask, progress)
-    write_all({options.out: encode_mask(_mask(document))})
+        document = select_object(document, script, given, progress, sureness.append)
+    mask = _mask(document)
+    write_all({options.out: encode_mask(mask)})
+    told = f"{_percent(mask)} of the photo selected{_how_sure(*sureness)}"
+    sys.stdout.write(f"wrote {options.out} in {stopwatch.read()['total']:.1f} s: {told}\n")
+
+
+def _percent(mask: Mask) -> str:
+    """How much a mask (H, W) covers, for people: of a small thing its px say more than 0%."""
+    share = float(mask.mean())
+    return f"{share:.0%}" if share >= 0.005 else f"{np.count_nonzero(mask):,} px"
+
+
+def _how_sure(sure: float | None) -> str:
+    """What there is to be said of a selection that is `sure`, to be appended; None: nothing."""
+    if sure is None:
+        return ""
+    if sure >= UNSURE:
+        return f", {sure:.0%} sure"
+    return f", only {sure:.0%} sure: --click what is missing, --not-click what is too much"
 
 
 def run_replay(options: argparse.Namespace) -> None:
