@@ -163,13 +163,15 @@ def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
     assert moved.message is not None and moved.message.is_error
 
 
-def film(editor: Editor) -> Path:
+def film(editor: Editor, folder: Path) -> Path:
     """A film that is being written."""
+    editor.settings = replace(editor.settings, export_folder=str(folder))
     editor.exporting.open()
     editor.exporting.choose_what(What.VIDEO)
     editor.exporting.choose_format(Format.GIF)
     editor.exporting.choose_seconds(1.0)
     path = editor.exporting.path
+    assert path.parent == folder
     editor.exporting.confirm()
     return path
 
@@ -181,7 +183,7 @@ def test_quitting_waits_for_a_file_unless_it_is_stopped(
     def begin() -> Path:
         moved.start(edits.set_placement(ball, 0, Placement(move=(25.0, -4.0))))
         if what == "film":
-            return film(moved)
+            return film(moved, tmp_path)
         path = tmp_path / "copy.png"
         moved.exporting.export_to(path)
         return path
@@ -214,8 +216,10 @@ def test_a_file_that_cannot_be_written_ends_the_waiting(moved: Editor, ball: Doc
     assert not moved.is_over and moved.message is not None and moved.message.is_error
 
 
-def test_a_film_is_written_to_its_end_after_its_tab_is_closed(moved: Editor) -> None:
-    path = film(moved)
+def test_a_film_is_written_to_its_end_after_its_tab_is_closed(
+    moved: Editor, tmp_path: Path
+) -> None:
+    path = film(moved, tmp_path)
     run(moved, "close")
     moved.filing.answer_discard()
     wait_for_jobs(moved)
