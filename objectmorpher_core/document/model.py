@@ -559,6 +559,7 @@ def is_shown_alike(one: EditObject, other: EditObject) -> bool:
 
     What is not cut out looks as the photo does.
     """
+
     def is_same(a: object, b: object) -> bool:
         is_plain = not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray)
         return a is b or (is_plain and a == b)

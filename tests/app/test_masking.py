@@ -20,11 +20,10 @@ from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.render.renderer import same_scene
 from objectmorpher.tools.brush_tools import MaskTool
-from objectmorpher.tools.pointer import Button, Pointer
+from objectmorpher.tools.pointer import Button
 from objectmorpher.tools.registry import Tool
 from objectmorpher.tools.select_tool import SelectTool
 from objectmorpher_core import segment
-from objectmorpher_core.base.arrays import crop
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Click, Document, EditObject, Placement, Prompt
@@ -326,62 +325,6 @@ def test_the_edited_picture_stays_whatever_tool_and_object(editor: Editor, ball:
         assert (_picture(editor) == wanted) != is_photo
     editor.view.is_before = False
     assert {(ToolName.SELECT, False), (ToolName.MASK, True), (ToolName.POSE, True)} <= shown
-
-
-def test_the_background_stays_until_that_of_one_object_more_is_made(
-    editor: Editor, ball: Document
-) -> None:
-    """What is only selected, or cleared, changes nothing; what is removed comes back at once."""
-    _moved_ball(editor, ball, 40.0, 5.0)
-    before, plate = build_scene(editor, "tiles"), editor.document.plate
-    assert before is not None and before.plate is not None
-    editor.objects.start_another()
-    corner = np.array([[2, 2], [32, 2], [32, 32], [2, 32]], float)
-    for change in (lambda: editor.selection.set_outline(corner), editor.selection.clear):
-        change()
-        wait_for_jobs(editor)
-        assert editor.document is not None and editor.document.plate is plate
-        scene = build_scene(editor, "tiles")
-        np.testing.assert_array_equal(scene.plate.pixels, before.plate.pixels)
-
-    editor.selection.set_outline(corner)
-    run(editor, "lift")
-    wait_until(editor, lambda: editor.is_lifted)
-    scene = build_scene(editor, "tiles")
-    assert scene is not None and scene.plate is not None and scene.mask is None
-    np.testing.assert_array_equal(scene.plate.pixels, before.plate.pixels)
-    wait_for_jobs(editor)
-    filled = editor.document.plate
-    assert filled is not None and filled is not plate
-    assert filled.hole[16 - filled.top, 16 - filled.left]
-    editor.placing.move_to(Placement(move=(-5.0, 90.0)))
-    editor.commit("Move object")
-    build_scene(editor, "tiles")
-    editor.objects.remove()
-    assert editor.document.plate is None, "it is being made"
-    shown = build_scene(editor, "tiles").plate
-    assert shown is not None
-    hole = crop(shown.hole, shown.box, (0, 0, WIDTH, HEIGHT))
-    assert not hole[:33, :33].any() and hole[int(CENTRE[1]), int(CENTRE[0]) - 20]
-    wait_for_jobs(editor)
-
-
-def test_what_has_left_its_place_cannot_be_pointed_at_there(editor: Editor, ball: Document) -> None:
-    _moved_ball(editor, ball, 60.0, 0.0)
-    editor.objects.start_another()
-    editor.view.tool, place = ToolName.SELECT, (CENTRE[0] - 25, CENTRE[1])
-    at = editor.view.canvas_from_image(np.array(place))
-    SelectTool().hover(editor, Pointer(*at))
-    assert editor.hover.place is None
-    draw(editor, SelectTool(), [place])
-    wait_for_jobs(editor)
-    assert editor.mask is None and editor.message is not None
-    assert editor.message.text == "Object 1 was here and has moved"
-    SelectTool().hover(editor, Pointer(*editor.view.canvas_from_image(np.array(FAR))))
-    assert editor.hover.place is not None
-    editor.undo()
-    SelectTool().hover(editor, Pointer(*at))
-    assert editor.landing.left_at(np.array(at)) is None, "it is there again"
 
 
 def _picture(editor: Editor) -> tuple:

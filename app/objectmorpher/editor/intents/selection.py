@@ -294,7 +294,8 @@ class LeavingOut:
         )
         if not self._landing.is_current_moved:
             return outlines
-        return tuple(derived.carried(document, editor.current, each) for each in outlines)
+        moved = (derived.carried(document, editor.current, each) for each in outlines)
+        return tuple(each.astype(np.float32) for each in moved)
 
     def poll(self) -> bool:
         """Offers what a new background shows; once a frame. Whether anything changed."""
