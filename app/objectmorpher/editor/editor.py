@@ -82,7 +82,7 @@ class Editor(EditorState):
         self.refining, self.exporting = RefiningIntents(self, self.methods), Exporting(self)
         self.tabs = Tabs(self, self.posing, self.tasks, self.start, self.leave)
         self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.tabs)
-        self.leaving_out = LeavingOut(self)
+        self.leaving_out = LeavingOut(self, self.landing)
         self.sample = SampleOpening(self, self.filing, self.selection, self.tasks)
         self.recovery = Recovery(self, self.tabs)
         self.pasting = Pasting(self, self.objects, self.tabs)
