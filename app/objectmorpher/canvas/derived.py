@@ -131,14 +131,15 @@ class Derived:
         shares = _the_same(shown_shares(document, ghosts, gone))
         base = self._shaded(
             lambda: shaded_plate(document, gone, ghosts),
-            document.plate, ghosts, *gone, *shaded(document, gone),
+            document.plate, ghosts, *gone, None, *shaded(document, gone),
         )  # fmt: skip
 
         def build() -> Plate | None:
             plate = plate_of_holes(document, gone, ghosts, base)
             return seen_plate(document.photo, plate, gone)
 
-        return self._plates(build, base, *gone, *(o.matte for o in document.objects), shares)
+        mattes = (o.matte for o in document.objects)
+        return self._plates(build, base, *gone, None, *mattes, shares)
 
     def bare_plate(self, document: Document) -> Plate | None:
         """Return the background of the view without any object."""
