@@ -138,8 +138,8 @@ class Derived:
             plate = plate_of_holes(document, gone, ghosts, base)
             return seen_plate(document.photo, plate, gone)
 
-        there = (o.matte for o in document.objects)
-        return self._plates(build, base, *gone, None, *there, shares)  # a copy has the same matte
+        mattes = (o.matte for o in document.objects)
+        return self._plates(build, base, *gone, None, *mattes, shares)
 
     def bare_plate(self, document: Document) -> Plate | None:
         """Return the background of the view without any object."""
