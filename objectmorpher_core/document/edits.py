@@ -56,11 +56,11 @@ def add_object(document: Document) -> Document:
 
 def remove_object(document: Document, k: int) -> Document:
     """Without object `k`. The plate, which filled its hole, goes too, unless a copy stays."""
-    objects = tuple(o for i, o in enumerate(document.objects) if i != k)
-    mask = document.objects[k].mask
-    is_copy = mask is not None and any(other.mask is mask for other in objects)
-    plate = document.plate if is_copy or document.objects[k].is_visitor else None
-    return replace(document, objects=objects, plate=plate, refined=None)
+    gone, objects = document.objects[k], (*document.objects[:k], *document.objects[k + 1 :])
+    is_copy = gone.mask is not None and any(other.mask is gone.mask for other in objects)
+    plate = document.plate if is_copy or not gone.hides_background else None
+    refined = document.refined if gone.matte is None else None
+    return replace(document, objects=objects, plate=plate, refined=refined)
 
 
 def set_mask(document: Document, k: int, mask: Selection | None, prompt: Prompt) -> Document:
@@ -75,10 +75,10 @@ def set_mask(document: Document, k: int, mask: Selection | None, prompt: Prompt)
 def change_mask(document: Document, k: int, mask: Selection) -> Document:
     """The mask (H, W) of object `k`, bool or soft u8, changed by hand; see `set_mask`.
 
-    What the prompt had given is kept beside it, so that `answer_prompt` knows what was changed.
+    What it was is kept beside it for `answer_prompt`, and for `set_plate`: what was taken away.
     """
     item = document.objects[k]
-    found = item.mask if item.found is None and not item.prompt.is_empty else item.found
+    found = item.mask if item.found is None else item.found
     return _with_mask(document, k, mask, item.prompt, found)
 
 
@@ -173,7 +173,7 @@ def refit(
         for each in document.objects
     )
     objects = tuple(decontaminated(photo, each) for each in fitted)
-    return replace(document, objects=objects, plate=plate, refined=None)
+    return set_plate(replace(document, objects=objects), plate)
 
 
 def set_lifted(
@@ -383,9 +383,18 @@ def set_visible(document: Document, k: int, is_visible: bool) -> Document:
 
 
 def set_plate(document: Document, plate: Plate | None) -> Document:
-    """The photo without its objects."""
-    changed = replace(document, plate=plate, refined=None)
+    """The photo without its objects; what the artist took out of a selection stays in it."""
+    changed = replace(document, plate=_with_refused(document, plate), refined=None)
     return changed if plate is None else changed.with_backend("inpaint", plate.backend)
+
+
+def _with_refused(document: Document, plate: Plate | None) -> Plate | None:
+    if plate is None or not any(o.found is not None or o.prompt.clicks for o in document.objects):
+        return plate
+    from ..compose.plate.plate import SEAM, hole_margin  # heavy
+    from ..compose.plate.residue import with_refused
+
+    return with_refused(plate, document, SEAM * hole_margin(*document.photo.size))
 
 
 def set_hints(document: Document, hints: tuple[Hint, ...]) -> Document:

@@ -337,7 +337,7 @@ class EditObject:
     is_visible: bool = True
     layer: int = 0  # in front of all of a lower one; within a layer the nearer, see compose.order
     coverage: U8 | None = None  # (H, W) where the edge was drawn soft; None: found in the photo
-    found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
+    found: Mask | None = None  # (H, W) what was found or drawn, where the mask was changed since
     shadow: Shadow = field(default_factory=Shadow)
     harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
     relight: float = 0.0  # in [0, 1], how far the light stays where it was while it turns
@@ -390,6 +390,11 @@ class EditObject:
     def matte_here(self) -> Matte | None:
         """Its matte, if that is of this photo."""
         return None if self.is_visitor else self.matte
+
+    @property
+    def hides_background(self) -> bool:
+        """Whether the plate is to be filled in behind it: not behind what is only selected."""
+        return self.matte_here is not None
 
     @property
     def is_moved(self) -> bool:
@@ -521,15 +526,17 @@ class Document:
     refined: Refined | None = None  # None: not asked for, or what it showed has changed since
 
     def with_object(self, k: int, changed: EditObject) -> Document:
-        """Object `k` replaced; the plate stays only where the mask did.
+        """Object `k` replaced; the plate stays only where what hides the background did.
 
-        The refinement stays only where nothing that is seen has changed.
+        The refinement stays only where nothing that is seen has changed. A selection that is not
+        cut out hides nothing, and is not seen.
         """
-        if k == len(self.objects):
-            return replace(self, objects=(*self.objects, changed), plate=None, refined=None)
-        plate = self.plate if changed.mask is self.objects[k].mask else None
-        refined = self.refined if is_shown_alike(changed, self.objects[k]) else None
-        objects = tuple(changed if i == k else o for i, o in enumerate(self.objects))
+        was = EditObject("") if k == len(self.objects) else self.objects[k]
+        is_alike = changed.hides_background is was.hides_background
+        is_alike &= changed.mask is was.mask or not was.hides_background
+        plate = self.plate if is_alike else None
+        refined = self.refined if is_shown_alike(changed, was) else None
+        objects = (*self.objects[:k], changed, *self.objects[k + 1 :])
         return replace(self, objects=objects, plate=plate, refined=refined)
 
     def with_backend(self, stage: str, name: str) -> Document:
@@ -548,12 +555,17 @@ SHOWN = (
 
 
 def is_shown_alike(one: EditObject, other: EditObject) -> bool:
-    """Whether two objects look the same; arrays do only where they are one and the same."""
+    """Whether two objects look the same; arrays do only where they are one and the same.
+
+    What is not cut out looks as the photo does.
+    """
 
     def is_same(a: object, b: object) -> bool:
         is_plain = not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray)
         return a is b or (is_plain and a == b)
 
+    if one.matte is None and other.matte is None:
+        return True
     return all(is_same(getattr(one, name), getattr(other, name)) for name in SHOWN)
 
 
@@ -563,6 +575,7 @@ def show_the_same(one: Document, other: Document) -> bool:
         return False
     if (one.horizon, one.feather) != (other.horizon, other.feather):
         return False
-    if one.depth is not other.depth or len(one.objects) != len(other.objects):
+    own, others = ([o for o in d.objects if o.matte is not None] for d in (one, other))
+    if one.depth is not other.depth or len(own) != len(others):
         return False
-    return all(map(is_shown_alike, one.objects, other.objects))
+    return all(map(is_shown_alike, own, others))

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ..base.arrays import F32, Mask, Pixels, Selection, crop, frozen, unit_pixels
+from ..base.masks import box_of
 from ..pictures.image import Picture
 from .model import SELECTED, Matte, Photo, Plate
 
@@ -34,48 +35,59 @@ def within(selection: Selection | None, picture: Picture) -> Selection | None:
     """
     if selection is None or picture.alpha is None or selection.shape != picture.alpha.shape:
         return selection
-    if picture.alpha.all():  # no ground is clear
+    if not selection.any() or picture.alpha.all():  # no ground is clear
         return selection
-    alpha = unit_pixels(picture.alpha)
+    width, reach = _edges(selection.shape)
+    x0, y0, x1, y1 = box_of(selection > 0, 3 * round(reach) + 3)  # nothing beyond matters
+    part = np.s_[y0:y1, x0:x1]
+    found = _within(selection[part], picture.alpha[part], width, reach)
+    if found is None:
+        return selection
+    whole = np.zeros(selection.shape, found.dtype)
+    whole[part] = found
+    return frozen(whole)
+
+
+def _within(selection: Selection, opacity: Pixels, width: float, reach: float) -> Selection | None:
+    """What is left of a part of a selection (h, w); None where all of it is solid."""
+    alpha = unit_pixels(opacity)
     away = _distance(alpha <= 0)
-    share = _edge_shares(alpha, away)
+    share = _edge_shares(alpha, away, round(reach))
     if (share >= 1).all():
-        return selection
+        return None
     is_soft = selection.dtype != np.bool_
     own = selection >= SELECTED if is_soft else selection
     coverage = np.rint(255 * share).astype(np.uint8)
     solid = coverage >= SELECTED
     beside = _distance(own)
-    is_open = (share < 1) | (away <= _width(share))  # the edge itself, and no other thing
-    is_rim = ~own & solid & is_open & (beside <= _width(share))  # selected a little short
-    near = np.minimum(_reach(share), _distance(solid & ~own & ~is_rim))
+    is_open = (share < 1) | (away <= width)  # the edge itself, and no other thing
+    is_rim = ~own & solid & is_open & (beside <= width)  # selected a little short
+    near = np.minimum(reach, _distance(solid & ~own & ~is_rim))
     is_fringe = ~own & (is_rim | (~solid & (beside < near)))
     most = selection if is_soft else own * np.uint8(255)
     found = np.where(is_fringe, coverage, np.minimum(coverage, most))
     is_hard = not is_soft and not ((found > 0) & (found < 255)).any()
-    return frozen(found > 0 if is_hard else found)
+    return found > 0 if is_hard else found
 
 
-def _edge_shares(alpha: F32, away: F32) -> F32:
+def _edge_shares(alpha: F32, away: F32, reach: int) -> F32:
     """(h, w) in [0, 1]: how solid each place is beside what it borders, near clear ground.
 
-    `away` (h, w): px from that; beyond, it is 1. So a pane of glass ends as sharply as it does,
-    and a blurred edge softly.
+    `away` (h, w): px from that; beyond `reach` it is 1. So a pane of glass ends as sharply as it
+    does, and a blurred edge softly.
     """
-    reach = round(_reach(alpha))
     around = cv2.dilate(alpha, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     share = np.where(away <= reach, alpha / np.maximum(around, 1e-6), 1)
     return np.asarray(share, np.float32)
 
 
-def _reach(image: np.ndarray) -> float:
-    """Px from clear ground in which an edge may be soft, for a photo of this size."""
-    return min(SOFT * _width(image), MOST_SOFT)
+def _edges(shape: tuple[int, int]) -> tuple[float, float]:
+    """Px from clear ground, in a photo (H, W): nothing else is behind an object; edges may be soft.
 
-
-def _width(image: np.ndarray) -> float:
-    """Px from clear ground in which nothing else is behind an object."""
-    return max(LEAST_EDGE, EDGE * float(np.hypot(*image.shape[:2])))
+    As many as `LEAST_EDGE` and `MOST_SOFT` allow.
+    """
+    width = max(LEAST_EDGE, EDGE * float(np.hypot(*shape)))
+    return width, min(SOFT * width, MOST_SOFT)
 
 
 def with_opacity(matte: Matte, picture: Picture, mask: Mask | None) -> Matte:
@@ -86,13 +98,18 @@ def with_opacity(matte: Matte, picture: Picture, mask: Mask | None) -> Matte:
     """
     if picture.alpha is None:
         return matte
-    whole = unit_pixels(picture.alpha)
-    there, away = (_around(image, matte.box) for image in (whole, _distance(whole <= 0)))
+    width, _ = _edges(picture.alpha.shape)
+    x0, y0, x1, y1 = matte.box
+    more = round(width) + 2  # px farther than where the distance from clear ground counts
+    left, top = max(x0 - more, 0), max(y0 - more, 0)
+    part = unit_pixels(picture.alpha[top : y1 + more, left : x1 + more])
+    box = x0 - left, y0 - top, x1 - left, y1 - top
+    there, away = (_around(image, box) for image in (part, _distance(part <= 0)))
     alpha = np.minimum(there, matte.alpha)
     own = matte.alpha > 0
     if mask is not None:
-        own |= crop(mask, (0, 0, *whole.shape[::-1]), matte.box)
-    is_edge = own & (away <= _width(whole))  # nothing else can be behind it
+        own |= crop(mask, (0, 0, *mask.shape[::-1]), matte.box)
+    is_edge = own & (away <= width)  # nothing else can be behind it
     alpha = np.where(is_edge | (there - alpha < STEP), there, alpha)
     if np.array_equal(alpha, matte.alpha):
         return matte

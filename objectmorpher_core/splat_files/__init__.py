@@ -41,6 +41,7 @@ __all__ = [
     "SplatFormat",
     "encode",
     "ending_of",
+    "is_mesh",
     "read",
     "read_object",
 ]  # fmt: skip
@@ -96,7 +97,7 @@ def read(path: Path, count: int = COUNT, is_flipped: bool = False) -> Gaussians:
     ending = ending_of(path)
     try:
         _check_file(path)
-        if _is_mesh(path):
+        if is_mesh(path):
             from .meshes.reader import read_mesh
 
             gaussians = read_mesh(path, count)
@@ -120,7 +121,7 @@ def read_object(path: Path, count: int = COUNT, is_flipped: bool = False) -> Gau
 
     gaussians = read(path, count, is_flipped)
     try:
-        return centred(gaussians) if _is_mesh(path) else as_object(gaussians)
+        return centred(gaussians) if is_mesh(path) else as_object(gaussians)
     except SplatFileError as error:
         raise SplatFileError(f"{named(path.name)}: {error}") from error
 
@@ -133,8 +134,11 @@ def _check_file(path: Path) -> None:
         raise SplatFileError(f"the file is larger than {MAX_BYTES >> 30} GiB")
 
 
-def _is_mesh(path: Path) -> bool:
-    """True where the file's surface is sampled; what a .ply is, its header says."""
+def is_mesh(path: Path) -> bool:
+    """True where the file's surface is sampled; what a .ply is, its header says.
+
+    Raises OSError and SplatFileError where that cannot be read.
+    """
     ending = ending_of(path)
     if not ending.endswith(".ply"):
         return ending in MESH_ENDINGS

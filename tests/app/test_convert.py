@@ -73,6 +73,7 @@ def test_what_is_refused_writes_nothing(folder, capsys):
     refused(["photo.png", "out.ply"], "photo.png has none of the endings", capsys)
     refused(["cat.ply", "no/out.ply"], "does not exist", capsys)
     refused(["cone.stl", "out.ply", "--count", "3"], "--count", capsys)
+    refused(["cat.ply", "out.ply", "--count", "500"], "only a mesh gets new Gaussians", capsys)
     refused([".", "out.ply"], "endings", capsys)
     assert sorted(Path().iterdir()) == before
     assert Path("out.ply").read_bytes() == b"old"

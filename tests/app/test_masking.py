@@ -327,23 +327,6 @@ def test_the_edited_picture_stays_whatever_tool_and_object(editor: Editor, ball:
     assert {(ToolName.SELECT, False), (ToolName.MASK, True), (ToolName.POSE, True)} <= shown
 
 
-def test_the_background_stays_until_that_of_one_object_more_is_made(
-    editor: Editor, ball: Document
-) -> None:
-    _moved_ball(editor, ball, 40.0, 5.0)
-    before = build_scene(editor, "tiles")
-    assert before is not None and before.plate is not None
-    editor.objects.start_another()
-    editor.selection.set_outline(np.array([[2, 2], [22, 2], [22, 22], [2, 22]], float))
-    assert editor.document is not None and editor.document.plate is None
-    scene = build_scene(editor, "tiles")
-    assert scene is not None and scene.plate is not None and scene.mask is None
-    np.testing.assert_array_equal(scene.plate.pixels, before.plate.pixels)
-    wait_for_jobs(editor)
-    assert editor.document.plate is not None
-    assert build_scene(editor, "tiles").plate is not scene.plate
-
-
 def _picture(editor: Editor) -> tuple:
     """What the canvas shows, by identity."""
     scene = build_scene(editor, "tiles")

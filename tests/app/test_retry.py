@@ -119,14 +119,15 @@ def test_a_background_that_gave_way_to_another_is_filled_in_when_it_is_wanted_ag
     mask = np.zeros_like(ball.objects[0].mask)
     mask[:20, :20] = True
     two = edits.set_mask(edits.add_object(ball), 1, mask, Prompt())
+    two = edits.keep_in_front(two, 1, ball.objects[0].matte)
     assert two.plate is None
-    editor.apply("Select", two)
+    editor.apply("Keep in front", two)
     editor.poll()
     assert editor.jobs.is_busy(PLATE)
     editor.undo()
     editor.composing.fill_from((), "Fill from a spot", lambda: None)  # as a drag of a source does
     wait_for_jobs(editor)
-    editor.apply("Select", two)
+    editor.apply("Keep in front", two)
     wait_for_jobs(editor)
     assert editor.document is not None and editor.document.plate is not None
 

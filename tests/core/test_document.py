@@ -60,13 +60,17 @@ def test_a_new_lift_takes_handles_and_pose_but_not_the_placement(document, scene
     assert changed.placement.scale == 2.0
 
 
-def test_the_plate_stays_as_long_as_the_masks_do(document):
+def test_the_plate_stays_as_long_as_what_hides_the_background_does(document):
     item = document.objects[0]
     moved = document.with_object(0, replace(item, placement=Placement(move=(5.0, 0.0))))
     assert moved.plate is document.plate
     masked = document.with_object(0, item.with_mask(shapes.mask("disc"), Prompt()))
     assert masked.plate is None
-    assert document.with_object(1, EditObject("Object 2")).plate is None
+    selected = EditObject("Object 2", mask=shapes.mask("disc"))
+    beside = document.with_object(1, selected)
+    assert beside.plate is document.plate
+    assert beside.with_object(1, selected.with_mask(None, Prompt())).plate is document.plate
+    assert beside.with_object(1, replace(selected, matte=item.matte)).plate is None
 
 
 def test_each_stage_has_one_backend(document):

@@ -239,7 +239,8 @@ def test_a_mask_changed_by_hand_remembers_what_the_prompt_gave(document):
     np.testing.assert_array_equal(item.mask, grow(mask, 6))
     assert item.lifted is not None and item.shaped is not None  # it is to be refitted
     by_hand = edits.change_mask(edits.set_mask(document, 0, mask, Prompt()), 0, grow(mask, 3))
-    assert by_hand.objects[0].found is None, "no prompt, nothing to tell apart"
+    by_hand = edits.change_mask(by_hand, 0, shrink(mask, 3)).objects[0]
+    np.testing.assert_array_equal(by_hand.found, mask)  # what was erased is known without a prompt
 
 
 def test_corrections_survive_every_later_answer(document):

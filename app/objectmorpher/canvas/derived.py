@@ -84,7 +84,7 @@ class Derived:
         self._links, self._bodies = Memo(), Memo()
         self._plates, self._shaded = Memo(), Memo()
         self._carriers, self._invented, self._hidden = Memo(), Memo(), Memo()
-        self._ghosts, self._standing = Memo(), Memo()
+        self._ghosts, self._standing, self._fitting = Memo(), Memo(), Memo()
         # The last background that was shown, and for which masks it was made
         self._filled: tuple[tuple[Mask, ...], Plate] | None = None
         self._seen, self._bare = Memo(2), Memo(2)
@@ -95,11 +95,16 @@ class Derived:
 
     def with_background(self, document: Document) -> Document:
         """Return the document; while its background is made anew, with the one it had before."""
+        there = [o.mask for o in document.objects if o.hides_background and o.mask is not None]
         if document.plate is not None:
-            masks = tuple(o.mask for o in document.objects if o.mask is not None)
-            self._filled = masks, document.plate
+            self._filled = tuple(there), document.plate
         elif self._filled is not None and len(_left(document)) > len(self._unfilled(document)):
-            plate = self._filled[1]
+            masks, whole = self._filled
+            gone = [mask for mask in masks if all(mask is not one for one in there)]
+            plate = whole
+            if gone:
+                args = whole, document.photo, gone, there
+                plate = self._fitting(lambda: _fitting(*args), whole, *gone, None, *there)
             return self._standing(lambda: replace(document, plate=plate), document, plate)
         return document
 
@@ -126,14 +131,15 @@ class Derived:
         shares = _the_same(shown_shares(document, ghosts, gone))
         base = self._shaded(
             lambda: shaded_plate(document, gone, ghosts),
-            document.plate, ghosts, *gone, *shaded(document, gone),
+            document.plate, ghosts, *gone, None, *shaded(document, gone),
         )  # fmt: skip
 
         def build() -> Plate | None:
             plate = plate_of_holes(document, gone, ghosts, base)
             return seen_plate(document.photo, plate, gone)
 
-        return self._plates(build, base, *gone, *(o.mask for o in document.objects), shares)
+        mattes = (o.matte for o in document.objects)
+        return self._plates(build, base, *gone, None, *mattes, shares)
 
     def bare_plate(self, document: Document) -> Plate | None:
         """Return the background of the view without any object."""
@@ -157,7 +163,7 @@ class Derived:
         from objectmorpher_core.compose.plate.residue import find_ghosts
 
         near = SEAM * hole_margin(*document.photo.size)
-        parts = tuple(part for o in document.objects for part in (o.matte, o.mask, o.lifted))
+        parts = tuple(part for o in document.objects for part in (o.matte, o.lifted))
         return self._ghosts(lambda: find_ghosts(document, near), document.plate, *parts)
 
     def invented_background(self, document: Document) -> Mask | None:
@@ -372,6 +378,24 @@ class Derived:
         return shape.puppet.pick_in(
             drawable, shape.texture, at, thing.pose, thing.placement, reach
         )  # fmt: skip
+
+
+def _fitting(plate: Plate, photo: Photo, gone: list[Mask], there: list[Mask]) -> Plate:
+    """The plate without what was filled in for objects that are `gone`: it is the photo again.
+
+    It ends halfway to what is still `there`.
+    """
+    x0, y0, x1, y1 = plate.box
+    to_gone, to_there = (
+        cv2.distanceTransform(
+            (~np.logical_or.reduce(masks)[y0:y1, x0:x1]).astype(np.uint8), cv2.DIST_L2, 5
+        )
+        for masks in (gone, there)
+    )
+    hole = plate.hole & (to_there <= to_gone)
+    painted = None if plate.painted is None else plate.painted & hole
+    pixels = np.where(hole[..., None], plate.pixels, photo.pixels[y0:y1, x0:x1])
+    return replace(plate, pixels=pixels, hole=hole, painted=painted)
 
 
 def _left(document: Document) -> list[Mask]:

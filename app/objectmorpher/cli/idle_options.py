@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from objectmorpher_core.scripting.options import FINISH, POSE, options_of
@@ -62,8 +63,16 @@ def _is_gone(said: Said) -> bool:
 
 
 def _reads_no_mesh(said: Said) -> bool:
-    name = str(said.get("source", "")).lower()
-    return name.endswith((".omorph", ".splat", ".spz", ".compressed.ply"))
+    """It is known to be none: what a .ply is, its header says."""
+    from objectmorpher_core.splat_files import SplatFileError, is_mesh
+
+    source = Path(said.get("source", ""))
+    if source.suffix.lower() == ".omorph":
+        return True
+    try:
+        return not is_mesh(source)
+    except (OSError, SplatFileError):
+        return False  # which reading it says better
 
 
 def _is_action(*actions: str) -> Callable[[Said], bool]:

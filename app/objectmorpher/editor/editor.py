@@ -82,7 +82,7 @@ class Editor(EditorState):
         self.refining, self.exporting = RefiningIntents(self, self.methods), Exporting(self)
         self.tabs = Tabs(self, self.posing, self.tasks, self.start, self.leave)
         self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.tabs)
-        self.leaving_out = LeavingOut(self)
+        self.leaving_out = LeavingOut(self, self.landing)
         self.sample = SampleOpening(self, self.filing, self.selection, self.tasks)
         self.recovery = Recovery(self, self.tabs)
         self.pasting = Pasting(self, self.objects, self.tabs)
@@ -110,7 +110,7 @@ class Editor(EditorState):
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
             self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
-            self.leaving_out.poll, self.old_shadows.poll,
+            self.leaving_out.poll, self.old_shadows.poll, self.filing.poll,
         )  # fmt: skip
 
     def _ask_elsewhere(self) -> None:

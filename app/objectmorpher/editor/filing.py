@@ -1,4 +1,4 @@
-"""Opening, saving and exporting, and the one question: what about unsaved changes?"""
+"""Opening, saving and exporting, and the questions about unsaved changes and unfinished files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..worker.requests import JobError
 from .export_plan import FORMATS
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, OpenedFile, is_object, read_document, read_photo
 from .settings import pictures_folder
-from .tasks import SELECT
+from .tasks import SELECT, WRITE
 from .view import ToolName
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ EXPORT_ENDINGS = tuple(
     dict.fromkeys(e for formats in FORMATS.values() for f in formats for e in f.endings)
 )
 OPEN = "open"  # kind of chores
+_WRITING = f"{WRITE} "  # what the kinds of jobs and chores that write a file begin with
 NAMED = 3  # files named in a message
 
 
@@ -74,6 +75,7 @@ class Filing:
         self.wanted: Dialog | None = None  # the window shows it
         self.question: Callable[[], None] | None = None  # goes on when the changes may be lost
         self.asked: tuple[Tab, ...] = ()  # the tabs with the changes that the question is about
+        self.leaving: Callable[[], None] | None = None  # goes on when all files are written
         self._after_save: Callable[[], None] | None = None
 
     def open(self, path: Path) -> None:
@@ -160,8 +162,45 @@ class Filing:
         self.guard(lambda: self._tabs.close(tab), (tab,))
 
     def quit(self, end: Callable[[], None], but: Tab | None = None) -> None:
-        """`end`, after one question about all tabs, save `but`, with unsaved changes."""
-        self.guard(end, tuple(tab for tab in self._tabs.all if tab is not but))
+        """`end`, after one question about all tabs, save `but`, with unsaved changes.
+
+        It waits for files that are being written, which the user may stop.
+        """
+
+        def leave() -> None:
+            if self.writing:
+                self._editor.message, self.leaving = None, end
+            else:
+                end()
+
+        self.guard(leave, tuple(tab for tab in self._tabs.all if tab is not but))
+
+    @property
+    def writing(self) -> tuple[str, ...]:
+        """Names of the files that are being written, or will be."""
+        kinds = (*self._editor.jobs.kinds, *self._editor.chores.kinds)
+        return tuple(Path(kind.removeprefix(_WRITING)).name for kind in kinds
+                     if kind.startswith(_WRITING))  # fmt: skip
+
+    def poll(self) -> bool:
+        """Leaves when the last file is written, unless that failed; once a frame."""
+        then, said = self.leaving, self._editor.message
+        if then is None or self.writing:
+            return False
+        self.leaving = None
+        if said is None or not said.is_error:
+            then()
+        return True
+
+    def answer_stop(self) -> None:
+        """What is being written is given up; then it goes on at once."""
+        for runs in (self._editor.jobs, self._editor.chores):
+            for kind in runs.kinds:
+                if kind.startswith(_WRITING):
+                    runs.cancel(kind)
+
+    def answer_stay(self) -> None:
+        self.leaving = None
 
     def guard(self, then: Callable[[], None], tabs: tuple[Tab, ...]) -> None:
         """`then`, at once where nothing of `tabs` would be lost, or after the user's answer."""

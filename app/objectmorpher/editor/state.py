@@ -243,6 +243,14 @@ class EditorState:
         own = self.object
         return _of_elsewhere(own) if own is not None and own.is_visitor else None
 
+    def say_left(self, k: int) -> None:
+        """That object `k` is not any more where it was clicked in the photo."""
+        if self.committed is not None:
+            item = self.committed.objects[k]
+            has_moved = t("{name} was here and has moved", name=item.name)
+            is_hidden = t("{name} was here and is hidden", name=item.name)
+            self.say(has_moved if item.is_visible else is_hidden)
+
     def say_locked(self, k: int) -> None:
         """That object `k` is locked, with a button that unlocks it."""
         if self.committed is not None:

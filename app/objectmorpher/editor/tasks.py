@@ -367,7 +367,7 @@ class Tasks:
         if document is None or document.plate is not None:
             return False
         # A fill is of these masks, and of the hints that are in force.
-        wanted = (*(o.mask for o in document.objects), *document.hints)
+        wanted = (*(o.mask for o in document.objects if o.hides_background), *document.hints)
         if not any(o.lifted and not o.is_visitor for o in document.objects):
             return False
         if self._plate is not None and same(self._plate[0], wanted):

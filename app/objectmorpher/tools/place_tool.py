@@ -32,6 +32,7 @@ REACH = 10.0  # points around a corner, or beside a ring, where a press takes it
 MIDDLE = 0.5  # x the outer ring's radius: so near to its centre the object is always moved
 ROUND = 0.35  # openness from which a ring is turned by the pointer's angle about its centre
 SLOW = 0.5  # x a ring's radius per radian: where it is seen to move slower, it runs into depth
+LEAST_BALL = 0.4  # x the outer ring's radius: nearer to the middle a point is held by this ball
 DEPTH_STEP = 0.05  # object diameters per notch of the wheel
 SCALE_SNAP = 0.1  # with Shift
 MIN_SCALE, MAX_SCALE = 0.02, 50.0
@@ -246,37 +247,50 @@ def _went(ring: Ring, first: np.ndarray) -> Callable[[np.ndarray], float]:
 
 
 def _ball(editor: Editor, first: Pointer) -> Change:
-    """The point under the finger stays there, as on a ball that turns about its middle.
+    """The grabbed point stays under the pointer, as far as a turn about the middle can take it.
 
-    Its sphere is as large as the rings, seen along the ray to its centre; beyond its edge it rolls.
+    Such a turn leaves it on a ball about the middle. Off that ball the pointer counts as at its
+    rim. What is near the middle, where the ball would spin, and what is beside the object is held
+    by a larger one.
     """
-    shown, start = gizmo(editor), editor.placing.placement
-    assert shown is not None and start is not None
-    sight = editor.placing.centre()
-    forward = sight / np.linalg.norm(sight)
-    right = np.cross([0.0, 1.0, 0.0], forward)
-    right /= np.linalg.norm(right)
-    axes = np.column_stack([right, np.cross(forward, right), forward])  # world from the ball's
+    start, document, shown = editor.placing.placement, editor.document, gizmo(editor)
+    assert start is not None and document is not None and shown is not None
+    camera, centre = editor.view.camera(document.photo.camera), editor.placing.centre()
+    reach, side = shown.radius * centre[2] / camera.focal, -1.0
+    seen = editor.posing.surface_at(first.xy)
+    if seen is not None:
+        arm = np.asarray(seen.world, np.float64) - centre
+        reach = max(float(np.linalg.norm(arm)), LEAST_BALL * reach)
+        side = 1.0 if arm @ seen.world > 0 and np.linalg.norm(arm) >= reach else -1.0
 
-    def place(xy: np.ndarray) -> np.ndarray:
-        at = (xy - shown.centre) / shown.radius
-        out = float(np.linalg.norm(at))
-        if out >= 1.0:
-            return np.array([*(at / out), 0.0])
-        return np.array([*at, -np.sqrt(1.0 - out * out)])
+    def on_ball(xy: np.ndarray) -> np.ndarray:
+        """(3,) unit, from the middle to where the ball is seen at canvas px (2,)."""
+        ray = camera.unproject(xy, 1.0)
+        ray /= np.linalg.norm(ray)
+        along = float(ray @ centre)
+        across = centre - along * ray  # from the ray's nearest point to the middle
+        gap = float(np.linalg.norm(across))
+        if gap < reach:
+            return (side * np.sqrt(reach**2 - gap**2) * ray - across) / reach
+        far = float(np.linalg.norm(centre))  # the rim is where a ray touches the ball
+        outward, towards = -across / gap, centre / far
+        outward -= (outward @ towards) * towards
+        sine = min(reach / far, 1.0)
+        rim = np.sqrt(1 - sine**2) * outward / np.linalg.norm(outward) - sine * towards
+        return rim / np.linalg.norm(rim)
 
-    begun, matrix = place(first.xy), turn_matrix(*start.turn)
+    begun, matrix = on_ball(first.xy), turn_matrix(*start.turn)
 
     def change(now: Pointer, away: float) -> Placement:
-        there = place(now.xy)
-        across = axes @ np.cross(begun, there)
+        there = on_ball(now.xy)
+        across = np.cross(begun, there)
         size, along = float(np.linalg.norm(across)), float(begun @ there)
         angle = np.arctan2(size, along)
         if now.shift:
             angle = np.radians(SNAP) * round(np.degrees(angle) / SNAP)
         turned = matrix_from_vector(angle * across / size if size > 1e-9 else np.zeros(3))
         turn = start.turn if size <= 1e-9 else turn_of(turned @ matrix)
-        return editor.placing.turned(replace(start, depth=start.depth + away), turn)
+        return editor.placing.rolled(replace(start, depth=start.depth + away), turn)
 
     return change
 

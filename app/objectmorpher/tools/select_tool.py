@@ -64,6 +64,9 @@ class SelectTool:
             else:
                 editor.objects.take_up(other)
             return
+        if (left := editor.landing.left_at(pointer.xy)) is not None:
+            editor.say_left(left)
+            return
         x, y = editor.landing.in_photo(pointer.xy)
         editor.selection.add_click(float(x), float(y), is_foreground)
 
@@ -96,7 +99,7 @@ class SelectTool:
         is_on_photo = editor.is_on_photo(pointer.xy)
         x, y = editor.view.image_from_canvas(pointer.xy)
         other = editor.landing.moved_at(pointer.xy)
-        is_place = is_on_photo and other is None
+        is_place = is_on_photo and other is None and editor.landing.left_at(pointer.xy) is None
         editor.hover = Hover(place=(float(x), float(y)) if is_place else None,
                              other=None if other == editor.current else other)  # fmt: skip
         if editor.hover.other is not None:

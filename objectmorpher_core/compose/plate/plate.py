@@ -58,7 +58,10 @@ def hole_margin(width: int, height: int) -> float:
 
 
 def plate_cover(document: Document) -> Mask:
-    """(H, W) True where an object hides the background, be it ever so little."""
+    """(H, W) True where an object hides the background, be it ever so little.
+
+    What is only selected hides nothing: it is a part of the photo as long as it is not lifted.
+    """
     width, height = document.photo.size
     covered = np.zeros((height, width), bool)
     for item in document.objects:
@@ -67,8 +70,6 @@ def plate_cover(document: Document) -> Mask:
             if shared is not None:
                 own = cut(matte.alpha, matte.box, shared)
                 cut(covered, (0, 0, width, height), shared)[own > 0] = True
-        elif item.mask is not None:
-            covered |= item.mask
     return covered
 
 
@@ -215,8 +216,7 @@ def plate_of_holes(
     if plate is not None:
         shares = shown_shares(document, ghosts, holes)
         plate = with_ghosts(plate, document.photo.pixels, ghosts, shares)
-    there = [o for o in document.objects if o.mask is not None and not o.is_visitor]
-    rest = [o for o in there if o.matte not in holes]
+    rest = [o for o in document.objects if o.hides_background and o.matte not in holes]
     if plate is None or not rest:
         return plate
     covered = np.zeros(plate.hole.shape, bool)

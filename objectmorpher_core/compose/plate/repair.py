@@ -251,6 +251,4 @@ def _covered(document: Document, box: Box) -> Mask:
     for item in document.objects:
         if (matte := item.matte_here) is not None:
             covered |= crop(matte.alpha, matte.box, box) > 0
-        elif item.mask is not None:
-            covered |= item.mask[y0:y1, x0:x1]
     return covered

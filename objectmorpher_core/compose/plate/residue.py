@@ -243,14 +243,10 @@ def tint_of(darker: np.ndarray) -> np.ndarray:
 def _away(item: EditObject, box: Box) -> F32:
     """(h, w) px of the box to what an object covers."""
     x0, y0, x1, y1 = box
-    if (matte := item.matte_here) is not None:
-        own = crop(matte.alpha, matte.box, box) > 0
-    elif item.mask is not None:
-        own = item.mask[y0:y1, x0:x1]
-    else:
-        own = np.zeros((y1 - y0, x1 - x0), bool)
-    if not own.any():
-        return np.full(own.shape, np.inf, np.float32)
+    matte = item.matte_here
+    own = None if matte is None else crop(matte.alpha, matte.box, box) > 0
+    if own is None or not own.any():
+        return np.full((y1 - y0, x1 - x0), np.inf, np.float32)
     return np.asarray(cv2.distanceTransform((~own).astype(np.uint8), cv2.DIST_L2, 5), np.float32)
 
 
@@ -339,6 +335,31 @@ def with_ghosts(
         hole[inner][there] = share > 0
         painted[inner][there] = share > 0
     return replace(plate, pixels=pixels, hole=hole, painted=painted if painted.any() else None)
+
+
+def with_refused(plate: Plate, document: Document, near: float) -> Plate:
+    """The plate with what the artist took out of a selection: the photo, and no residue.
+
+    That is what was erased, and each piece that holds a click which says that it does not belong.
+    """
+    objects, left, top = document.objects, plate.left, plate.top
+    clicks = [c for o in objects for c in o.prompt.clicks if not c.is_foreground]
+    erased = np.zeros_like(plate.hole)
+    for item in objects:
+        if item.found is not None and item.mask is not None:
+            erased |= (item.found & ~item.mask)[top : plate.box[3], left : plate.box[2]]
+    if not clicks and not erased.any():
+        return plate
+    refused = []
+    for ghost in find_ghosts(replace(document, plate=plate), near):
+        x0, y0, x1, y1 = ghost.box
+        places = [(int(c.y) - top - y0, int(c.x) - left - x0) for c in clicks]
+        inside = [(y, x) for y, x in places if 0 <= y < y1 - y0 and 0 <= x < x1 - x0]
+        is_all = any(ghost.there[place] for place in inside)
+        there = ghost.there if is_all else ghost.there & erased[y0:y1, x0:x1]
+        if there.any():
+            refused.append(replace(ghost, there=there))
+    return with_ghosts(plate, document.photo.pixels, refused, [0.0] * len(refused))
 
 
 # What of it may be a part of the object, to be added to its selection.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from editor_steps import CENTRE, HEIGHT, WIDTH, wait_for_jobs
+from editor_steps import CENTRE, HEIGHT, WIDTH, wait_for_jobs, wait_until
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.export_plan import FORMATS, Format, VideoMotion, What
@@ -161,6 +161,69 @@ def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
     exporting.close()
     exporting.export_to(path.with_suffix(".mp4"))  # a photo is no film
     assert moved.message is not None and moved.message.is_error
+
+
+def film(editor: Editor, folder: Path) -> Path:
+    """A film that is being written."""
+    editor.settings = replace(editor.settings, export_folder=str(folder))
+    editor.exporting.open()
+    editor.exporting.choose_what(What.VIDEO)
+    editor.exporting.choose_format(Format.GIF)
+    editor.exporting.choose_seconds(1.0)
+    path = editor.exporting.path
+    assert path.parent == folder
+    editor.exporting.confirm()
+    return path
+
+
+@pytest.mark.parametrize("what", ["film", "photo"])
+def test_quitting_waits_for_a_file_unless_it_is_stopped(
+    moved: Editor, ball: Document, tmp_path: Path, what: str
+) -> None:
+    def begin() -> Path:
+        moved.start(edits.set_placement(ball, 0, Placement(move=(25.0, -4.0))))
+        if what == "film":
+            return film(moved, tmp_path)
+        path = tmp_path / "copy.png"
+        moved.exporting.export_to(path)
+        return path
+
+    path = begin()
+    run(moved, "quit")
+    assert not moved.is_over and moved.filing.writing == (path.name,)
+    moved.filing.answer_stop()
+    wait_until(moved, lambda: moved.is_over)
+    assert not path.exists()
+    moved.is_over = False
+    assert begin() == path
+    run(moved, "quit")
+    moved.filing.answer_stay()
+    wait_for_jobs(moved)
+    assert path.exists() and not moved.is_over
+    path.unlink()
+    assert begin() == path
+    run(moved, "quit")
+    wait_until(moved, lambda: moved.is_over)
+    assert path.exists()
+    moved.is_over = False
+
+
+def test_a_file_that_cannot_be_written_ends_the_waiting(moved: Editor, ball: Document) -> None:
+    moved.start(ball)
+    moved.exporting.export_to(Path("/nowhere/copy.png"))
+    run(moved, "quit")
+    wait_until(moved, lambda: moved.filing.leaving is None)
+    assert not moved.is_over and moved.message is not None and moved.message.is_error
+
+
+def test_a_film_is_written_to_its_end_after_its_tab_is_closed(
+    moved: Editor, tmp_path: Path
+) -> None:
+    path = film(moved, tmp_path)
+    run(moved, "close")
+    moved.filing.answer_discard()
+    wait_for_jobs(moved)
+    assert moved.document is None and path.exists()
 
 
 def test_bit_depth_is_the_photos_own_until_another_is_chosen(moved: Editor) -> None:

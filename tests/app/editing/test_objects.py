@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -9,15 +10,20 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from editor_steps import duplicate, wait_for_jobs
+from editor_steps import CENTRE, HEIGHT, WIDTH, duplicate, wait_for_jobs, wait_until
 from objectmorpher.canvas.frame import build_frame, drawn_order
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
+from objectmorpher.gui.window.scenes import build_scene
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.select_tool import SelectTool
+from objectmorpher_core.base.arrays import crop
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session, encode_session
+from strokes import stroke
 from tests.tree import over
 
 
@@ -192,3 +198,79 @@ def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
     copied.travel(copied.history.cursor - 1)
     assert copied.document is not None and copied.document.objects[0].is_visible
     assert copied.current == 0
+
+
+def test_the_background_stays_until_that_of_one_object_more_is_made(
+    editor: Editor, ball: Document
+) -> None:
+    """What is only selected, or cleared, changes nothing; what is removed comes back at once."""
+    editor.start(ball)
+    editor.placing.move_to(Placement(move=(40.0, 5.0)))
+    editor.commit("Move object")
+    before, plate = build_scene(editor, "tiles"), editor.document.plate
+    assert before is not None and before.plate is not None
+    editor.objects.start_another()
+    corner = np.array([[2, 2], [32, 2], [32, 32], [2, 32]], float)
+    for change in (lambda: editor.selection.set_outline(corner), editor.selection.clear):
+        change()
+        wait_for_jobs(editor)
+        assert editor.document is not None and editor.document.plate is plate
+        scene = build_scene(editor, "tiles")
+        np.testing.assert_array_equal(scene.plate.pixels, before.plate.pixels)
+
+    editor.selection.set_outline(corner)
+    run(editor, "lift")
+    wait_until(editor, lambda: editor.is_lifted)
+    scene = build_scene(editor, "tiles")
+    assert scene is not None and scene.plate is not None and scene.mask is None
+    np.testing.assert_array_equal(scene.plate.pixels, before.plate.pixels)
+    wait_for_jobs(editor)
+    filled = editor.document.plate
+    assert filled is not None and filled is not plate
+    assert filled.hole[16 - filled.top, 16 - filled.left]
+    editor.placing.move_to(Placement(move=(-5.0, 90.0)))
+    editor.commit("Move object")
+    build_scene(editor, "tiles")
+    editor.objects.remove()
+    assert editor.document.plate is None, "it is being made"
+    shown = build_scene(editor, "tiles").plate
+    assert shown is not None
+    hole = crop(shown.hole, shown.box, (0, 0, WIDTH, HEIGHT))
+    assert not hole[:33, :33].any() and hole[int(CENTRE[1]), int(CENTRE[0]) - 20]
+    wait_for_jobs(editor)
+
+
+def test_what_has_left_its_place_cannot_be_pointed_at_there(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    editor.placing.move_to(Placement(move=(60.0, 0.0)))
+    editor.commit("Move object")
+    editor.objects.start_another()
+    editor.view.tool, place = ToolName.SELECT, (CENTRE[0] - 25, CENTRE[1])
+    at = editor.view.canvas_from_image(np.array(place))
+    SelectTool().hover(editor, Pointer(*at))
+    assert editor.hover.place is None
+    stroke(editor, SelectTool(), at)
+    wait_for_jobs(editor)
+    assert editor.mask is None and editor.message is not None
+    assert editor.message.text == "Object 1 was here and has moved"
+    SelectTool().hover(editor, Pointer(*editor.view.canvas_from_image(np.array([20.0, 20.0]))))
+    assert editor.hover.place is not None
+    editor.undo()
+    SelectTool().hover(editor, Pointer(*at))
+    assert editor.landing.left_at(np.array(at)) is None, "it is there again"
+
+
+def test_what_is_offered_is_outlined_where_its_object_would_show_it(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    assert ball.plate is not None
+    hole, pixels = ball.plate.hole.copy(), ball.plate.pixels.copy()
+    hole[2:14, 2:14], pixels[2:14, 2:14] = True, 255
+    editor.apply("Fill", edits.set_plate(ball, replace(ball.plate, hole=hole, pixels=pixels)))
+    editor.poll()
+    outlines = editor.leaving_out.outlines
+    assert len(outlines) == 1, editor.message
+    editor.placing.move_to(Placement(move=(30.0, 8.0)))
+    moved = editor.leaving_out.outlines
+    assert (np.abs(moved[0] - outlines[0] - (30.0, 8.0)) < 4).all()

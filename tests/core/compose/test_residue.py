@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
@@ -11,7 +12,7 @@ from skimage import data
 
 from objectmorpher.canvas.derived import Derived
 from objectmorpher_core import compose
-from objectmorpher_core.base.arrays import F32, Mask, Pixels
+from objectmorpher_core.base.arrays import F32, Mask, Pixels, crop
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.order import holes
 from objectmorpher_core.compose.plate import plate as plates
@@ -20,12 +21,20 @@ from objectmorpher_core.compose.plate.plate import (
     build_plate,
     erased_beside,
     hole_margin,
+    plate_cover,
     plate_crop,
     plate_of_holes,
 )
 from objectmorpher_core.compose.plate.residue import find_ghosts, left_out, with_parts
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
+from objectmorpher_core.document.model import (
+    Click,
+    Document,
+    LiftSettings,
+    Photo,
+    Placement,
+    Prompt,
+)
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import cut_out
@@ -225,3 +234,43 @@ def test_a_part_that_was_left_out_can_be_added(footless: Document):
     assert (grown & missed).sum() > 0.6 * missed.sum()
     assert (grown ^ own).sum() < 0.6 * (mask ^ own).sum()
     assert cv2.connectedComponents(grown.astype(np.uint8))[0] == 2, "it is joined to the object"
+
+
+def test_what_was_taken_out_of_a_selection_is_never_residue(footless: Document):
+    """Erased, or right-clicked, it stays in the photo, is not offered, and cannot be found anew."""
+    pixels, photo = footless.photo.pixels, footless.photo
+    item, plate = footless.objects[0], footless.plate
+    assert item.mask is not None and plate is not None
+    part = left_out(footless, find_ghosts(footless, SEAM * MARGIN), MARGIN)[0]
+    x0, y0, x1, y1 = (n + (plate.left, plate.top)[i % 2] for i, n in enumerate(part.box))
+    foot = crop(part.there, (x0, y0, x1, y1), (0, 0, WIDTH, HEIGHT))
+    y, x = np.argwhere(foot)[0]
+    away = Placement(move=(0.0, -120.0))
+
+    wide = edits.set_mask(edits.add_object(Document(photo)), 0, item.mask | foot, Prompt())
+    erased = edits.change_mask(wide, 0, item.mask).objects[0]
+    click = Click(float(x), float(y), is_foreground=False)
+    clicked = replace(item, prompt=Prompt((Click(240.0, 180.0), click)))
+    for own in (replace(item, found=erased.found), clicked):
+        document = edits.set_plate(replace(footless, objects=(own,)), plate)
+        left = document.plate
+        assert left is not None
+        assert not (crop(left.hole, left.box, (0, 0, WIDTH, HEIGHT)) & foot).any()
+        moved = composite(edits.set_placement(document, 0, away)).pixels
+        np.testing.assert_array_equal(moved[foot], pixels[foot])
+    gone = composite(edits.set_placement(footless, 0, away)).pixels
+    assert (gone[foot] != pixels[foot]).any(-1).mean() > 0.8, "else it goes with its object"
+
+
+def test_what_is_only_selected_changes_no_pixel_of_the_edit(footless: Document):
+    """As `replay` draws it: also where it touches what was moved, and what that has left."""
+    foot = np.zeros_like(footless.objects[0].mask)
+    foot[230:300, 100:400] = True
+    for placement in (Placement(move=(0.0, -120.0)), Placement(turn=(40.0, 0.0, 0.0))):
+        moved = edits.set_placement(footless, 0, placement)
+        selected = edits.set_mask(edits.add_object(moved), 1, foot, Prompt())
+        assert selected.plate is moved.plate and (foot & ~moved.objects[0].mask).any()
+        np.testing.assert_array_equal(composite(selected).pixels, composite(moved).pixels)
+        again = edits.remove_object(selected, 1)
+        assert again.plate is moved.plate
+        assert (plate_cover(selected) == plate_cover(moved)).all()

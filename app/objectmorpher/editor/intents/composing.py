@@ -427,8 +427,8 @@ def _nothing() -> None:
 
 
 def masks_of(document: Document) -> tuple[Mask | None, ...]:
-    """The masks (H, W) of a document's objects: what was computed of others is out of date."""
-    return tuple(o.mask for o in document.objects)
+    """The masks (H, W) of what hides the background: what was computed of others is out of date."""
+    return tuple(o.mask for o in document.objects if o.hides_background)
 
 
 def seen_from(document: Document, k: int, shadow: Shadow) -> float:

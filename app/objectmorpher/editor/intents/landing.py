@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.document.model import Document
 
 from ..view import Shown, ToolName
 
@@ -58,16 +59,34 @@ class Landing:
 
     def moved_at(self, canvas_xy: np.ndarray) -> int | None:
         """Index of the moved object that is seen at canvas px (2,); None where none is."""
-        editor = self._editor
-        document = editor.document
+        document = self._editor.document
         if document is None or not self.is_edit_shown:
             return None
+        k = self._seen_at(document, canvas_xy)
+        return k if k is not None and document.objects[k].is_moved else None
+
+    def left_at(self, canvas_xy: np.ndarray) -> int | None:
+        """Index of the object that was at canvas px (2,) and has left; None where anything is."""
+        from objectmorpher_core.compose.order import leaves_a_hole
+
+        editor, document = self._editor, self._editor.document
+        if document is None or not self.is_edit_shown or not editor.is_on_photo(canvas_xy):
+            return None
+        column, row = np.floor(editor.view.image_from_canvas(canvas_xy)).astype(int)
+        objects = document.objects
+        there = [k for k, o in enumerate(objects) if o.mask is not None and o.mask[row, column]]
+        if not there or not all(objects[k].is_moved and leaves_a_hole(objects, k) for k in there):
+            return None
+        return there[0] if self._seen_at(document, canvas_xy) is None else None
+
+    def _seen_at(self, document: Document, canvas_xy: np.ndarray) -> int | None:
+        """Index of the lifted object that is in front of all others at canvas px (2,)."""
+        editor = self._editor
         for k in reversed(self._objects.order()):
             item = document.objects[k]
-            if item.lifted is None or not item.is_visible:
-                continue
-            if editor.derived.surface_at(document, k, editor.view, canvas_xy) is not None:
-                return k if item.is_moved else None
+            is_seen = item.lifted is not None and item.is_visible
+            if is_seen and editor.derived.surface_at(document, k, editor.view, canvas_xy):
+                return k
         return None
 
     def owner_at(self, canvas_xy: np.ndarray) -> int | Of | None:
@@ -80,11 +99,8 @@ class Landing:
         is_shown = self.is_edit_shown and editor.is_on_photo(canvas_xy)
         if document is None or not is_shown:
             return None
-        for k in reversed(self._objects.order()):
-            item = document.objects[k]
-            is_seen = item.lifted is not None and item.is_visible
-            if is_seen and editor.derived.surface_at(document, k, editor.view, canvas_xy):
-                return k
+        if (k := self._seen_at(document, canvas_xy)) is not None:
+            return k
         plate = editor.derived.plate(document)
         if plate is None:
             return Of.PHOTO

@@ -96,7 +96,7 @@ class Placing:
         return self.turned(start, self.gimbal.turn(angles))
 
     def centre(self) -> np.ndarray:
-        """(3,) world: what the object turns about."""
+        """(3,) world: the object's middle, about which its rings lie and a hand rolls it."""
         document, thing = self._editor.document, self._editor.object
         assert document is not None and thing is not None and thing.lifted is not None
         return centre_of(thing.placement, thing.lifted, document.photo.camera)
@@ -202,6 +202,10 @@ class Placing:
         except ValueError:  # behind the camera, as `move_to` will say
             changed = replace(start, turn=turn)
         return self.stood(changed)
+
+    def rolled(self, start: Placement, turn: tuple[float, float, float]) -> Placement:
+        """`start` with another turn, about the object's middle, as a ball in the hand."""
+        return self.stood(replace(start, turn=turn))
 
     def scaled(self, start: Placement, scale: float) -> Placement:
         """`start` with another scale, about the object's foot where it stands."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..candidate import Candidates, CloserLook
     from ..state import EditorState
     from ..tasks import Tasks
+    from .landing import Landing
     from .masking import Masking
 
 SAME_PLACE = 5.0  # points: a click this near to the last one asks for more or less around it
@@ -262,8 +263,8 @@ MOST_OFFERED = 4  # pieces
 class LeavingOut:
     """The pieces beside the document's lifted objects."""
 
-    def __init__(self, editor: EditorState) -> None:
-        self._editor = editor
+    def __init__(self, editor: EditorState, landing: Landing) -> None:
+        self._editor, self._landing = editor, landing
         self._offered: Action | None = None
         self._seen: Plate | None = None  # the background that was looked at last
         self._found: tuple[Plate | None, tuple[Ghost, ...]] = (None, ())  # of which plate
@@ -278,19 +279,23 @@ class LeavingOut:
 
     @property
     def outlines(self) -> tuple[F32, ...]:
-        """(N, 2) image px each, around what is offered now."""
+        """(N, 2) image px each, around what is offered now: where its object would show it."""
         message, document = self._editor.message, self._editor.document
         if self._offered is None or message is None or message.action is not self._offered:
             return ()
         if document is None or document.plate is None:
             return ()
         corner = np.array([document.plate.left, document.plate.top], np.float32)
-        contours = self._editor.derived.contours
-        return tuple(
+        derived, editor = self._editor.derived, self._editor
+        outlines = tuple(
             outline + corner + np.array(piece.box[:2], np.float32)
             for piece in self.pieces
-            for outline in contours(piece.there)
+            for outline in derived.contours(piece.there)
         )
+        if not self._landing.is_current_moved:
+            return outlines
+        moved = (derived.carried(document, editor.current, each) for each in outlines)
+        return tuple(each.astype(np.float32) for each in moved)
 
     def poll(self) -> bool:
         """Offers what a new background shows; once a frame. Whether anything changed."""
@@ -313,9 +318,9 @@ class LeavingOut:
             return
         self._offered = Action(t("Add it") if count == 1 else t("Add them"), self.add)
         name = self._editor.object.name
-        question = t("Is the dotted piece a part of {name}?", name=name)
+        question = t("Is the outlined piece a part of {name}?", name=name)
         if count > 1:
-            question = t("Are the dotted pieces parts of {name}?", name=name)
+            question = t("Are the outlined pieces parts of {name}?", name=name)
         self._editor.say(question, self._offered)
 
     def add(self) -> None:

@@ -1,4 +1,4 @@
-"""File dialogs, the system's or our own, and the question about unsaved changes."""
+"""File dialogs, the system's or our own, and the questions before the window closes."""
 
 from __future__ import annotations
 
@@ -66,6 +66,9 @@ class Dialogs:
         if editor.filing.question is not None:  # before all others, which come back after it
             self._draw_question(editor)
             return
+        if editor.filing.leaving is not None or imgui.is_popup_open(_leaving()):
+            _draw_leaving(editor.filing)
+            return
         self._chooser.draw(editor)
         if not self.is_open:  # one at a time; the export waits for the file that is chosen for it
             draw_export(editor)
@@ -123,6 +126,30 @@ class Dialogs:
         imgui.set_cursor_pos_y(lower)
         if button(t("Cancel"), width=104) or is_dismissed():
             answer = filing.answer_cancel
+        if answer is not None:
+            imgui.close_current_popup()
+            answer()
+
+
+def _leaving() -> str:
+    return t("A file is still being written")
+
+
+def _draw_leaving(filing: Filing) -> None:
+    """What is still being written, and whether to wait for it; once more when that failed."""
+    names = "\n".join(f"{Icon.EXPORT}  {name}" for name in filing.writing[:LISTED])
+    about = names + "\n" + t("It is finished first; then ObjectMorpher quits.")
+    with modal(_leaving(), QUESTION, about) as is_shown:
+        if not is_shown:
+            return
+        answer = None if filing.leaving is not None else filing.answer_stay  # it could not be
+        top = imgui.get_cursor_pos_y()
+        if button(t("Don't quit"), Emphasis.PRIMARY, width=132) or is_confirmed() or is_dismissed():
+            answer = filing.answer_stay
+        imgui.same_line()
+        imgui.set_cursor_pos_y(top + theme.pt((PRIMARY - FIELD) / 2))
+        if button(t("Stop it and quit"), width=132):
+            answer = filing.answer_stop
         if answer is not None:
             imgui.close_current_popup()
             answer()

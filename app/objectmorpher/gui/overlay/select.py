@@ -52,9 +52,9 @@ def draw_edge(canvas: CanvasPainter) -> None:
 
 
 def draw_left_out(canvas: CanvasPainter) -> None:
-    """Dotted lines around what is offered to be added to the selection."""
+    """Dashed lines around what is offered to be added: dots would look like points to drag."""
     for outline in canvas.editor.leaving_out.outlines:
-        _draw_dots(canvas, outline, WHITE, 1.0)
+        canvas.dashes(canvas.at(outline))
 
 
 def _draw_dots(canvas: CanvasPainter, outline: np.ndarray, color: str, share: float) -> None:
