@@ -127,12 +127,12 @@ def _guide(small: F32, known: F32, hints: tuple[Hint, ...]) -> Guide:
 # The regions beside a hole go on behind it: ground under ground, house behind house.
 
 REGIONS = 12
-LOOK = 2.0  # px, standard deviation, over which a place's colour is taken; its roughness over twice
+LOOK = 5.0  # px, standard deviation, over which a place's colour is taken; its roughness over twice
 ROUGH = 1.5  # x a colour channel's weight, of the roughness
 PLACE = 0.5  # x the spread of the looks: what the root of the hole's area weighs beside it
 SAMPLES, ROUNDS = 8_000, 30  # places that are parted into regions, and in how many steps
 ACROSS = 3.0  # x so near is what lies beside: most of a photo lies in layers
-UNLIKE = 10.0  # levels of CIE Lab between regions that are hardly of one kind
+UNLIKE = 20.0  # levels of CIE Lab between regions that are hardly of one kind
 REGION_COST = 4000.0  # squared levels of 255 that a source of wholly another kind costs
 
 
