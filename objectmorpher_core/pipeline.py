@@ -303,7 +303,7 @@ def _carried_out(
             how = RefineOptions(refiner, script.seed, script.refine_strength)
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
     edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
-    notes = (*notes, *runner.guesses(document, run.puppets))
+    notes = (*notes, *runner.erased(document), *runner.guesses(document, run.puppets))
     if script.key:
         moments = (document, *runner.key_poses(document, 0, run.puppets[0], script))
         edited = replace(edited, document=with_keys(edited.document, moments))

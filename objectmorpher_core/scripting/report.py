@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..compose.composite import Composite
+from ..compose.order import holes
+from ..compose.plate.plate import erased_beside
 from ..deform.puppet import Puppet
 from ..document.model import Document, EditObject, Placement
 from ..raster.trust import trust_in
@@ -73,7 +75,7 @@ def build_report(
     width, height = document.photo.size
     first = min(puppets)
     used = dict(document.backends)
-    shares = result.shares
+    shares, beside = result.shares, erased_beside(document, holes(document))
     report = {
         "version": VERSION,
         "photo": {"width": width, "height": height},
@@ -82,6 +84,8 @@ def build_report(
             "changed": result.changed,
             "outside_footprint_changed": result.outside_footprint_changed,
             "shadow": result.shadow,
+            "beside": sum(piece.px for piece in beside),
+            "beside_like_object": sum(piece.like_px for piece in beside),
             "from_photo": shares.from_photo,
             "from_lifter": shares.from_lifter,
             "from_inpainter": shares.from_inpainter,

@@ -15,8 +15,8 @@ from ..base.files import read_input
 from ..base.progress import Progress, part, silent
 from ..compose import refine
 from ..compose.composite import composite, object_texture
-from ..compose.order import reordered
-from ..compose.plate.plate import plate_cover
+from ..compose.order import holes, reordered
+from ..compose.plate.plate import erased_beside, plate_cover
 from ..compose.refine import refinement
 from ..compose.refine.refinement import CoarseEdit
 from ..deform.puppet import Puppet, puppet_of
@@ -222,6 +222,19 @@ def contradicted(document: Document) -> tuple[str, ...]:
         for item in document.objects
         if item.lifted is not None and item.lifted.kind in SOLIDS and item.lifted.likeness < LIKE
     )
+
+
+def erased(document: Document) -> tuple[str, ...]:
+    """What the edit takes off the photo though it looks like part of an object, a sentence each."""
+    found = []
+    for piece in erased_beside(document, holes(document)):
+        item, (x, y) = document.objects[piece.owner], piece.place
+        if item.is_visible and piece.like_px:
+            found.append(
+                f"{piece.like_px:,} px beside {item.name} look like part of it and are erased: "
+                f"to keep them, choose them, too (about {x},{y})"
+            )
+    return tuple(found)
 
 
 def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:

@@ -2,7 +2,8 @@
 
 The search runs on a small picture of the hole and its surroundings, which keeps any photo's time
 bounded (`completion`); the detail is the photo's own (`patch_detail`). What it is guided by:
-straight edges that go on behind the hole, what surroundings are like, and the user's hints.
+straight edges that go on behind the hole, the regions beside it, what its surroundings are like,
+and the user's hints.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ...document.settings import Hint
 from .. import InpaintError
 from .completion import Completion, complete, shrunk, smooth
 from .patch_detail import with_detail
-from .sources import Guide, unlikely
+from .sources import Guide, Regions, unlikely
 from .structure_lines import find_lines
 
 SEARCH_PIXELS = 100_000  # of the small picture
@@ -119,4 +120,61 @@ def _guide(small: F32, known: F32, hints: tuple[Hint, ...]) -> Guide:
     """What guides the filling of a picture (h, w, 3) that is `known` (h, w) in [0, 1]."""
     hole = known < min(0.5, float(known.max()))
     guess = smooth(small, (~hole).astype(np.float32))
-    return Guide(unlikely(guess, hole), find_lines(guess, hole), hints)
+    lines = find_lines(guess, hole)
+    return Guide(unlikely(guess, hole), lines, hints, regions=find_regions(small, hole))
+
+
+# The regions beside a hole go on behind it: ground under ground, house behind house.
+
+REGIONS = 12
+LOOK = 5.0  # px, standard deviation, over which a place's colour is taken; its roughness over twice
+ROUGH = 1.5  # x a colour channel's weight, of the roughness
+PLACE = 0.5  # x the spread of the looks: what the root of the hole's area weighs beside it
+SAMPLES, ROUNDS = 8_000, 30  # places that are parted into regions, and in how many steps
+ACROSS = 3.0  # x so near is what lies beside: most of a photo lies in layers
+UNLIKE = 20.0  # levels of CIE Lab between regions that are hardly of one kind
+REGION_COST = 4000.0  # squared levels of 255 that a source of wholly another kind costs
+
+
+def find_regions(rgb: F32, hole: Mask) -> Regions:
+    """The regions of a picture (h, w, 3) of levels up to 255, continued behind its hole (h, w).
+
+    A place in the hole is of all the regions around it, of the nearer ones the more.
+    """
+    known = (~hole).astype(np.float32)
+    looks = _looks(rgb, known)
+    places = np.dstack(np.indices(hole.shape, np.float32)) / np.sqrt(max(hole.sum(), 1))
+    spread = np.linalg.norm(looks[~hole].std(0))
+    features = np.dstack([looks, PLACE * spread * places])
+    samples = np.ascontiguousarray(features[~hole][:: (~hole).sum() // SAMPLES + 1], np.float32)
+    cv2.setRNGSeed(0)
+    stop = (cv2.TERM_CRITERIA_MAX_ITER, ROUNDS, 0.0)
+    count, way = min(REGIONS, len(samples)), cv2.KMEANS_PP_CENTERS
+    _, _, centers = cv2.kmeans(samples, count, None, stop, 1, way)  # type: ignore[call-overload]
+    number = np.stack([((features - c) ** 2).sum(-1) for c in centers]).argmin(0)
+    own = np.asarray(number[..., None] == np.arange(count), np.float32)
+    height, width = hole.shape
+    small, share = shrunk(own, known, (max(round(width / ACROSS), 1), height))
+    wide = [
+        cv2.resize(each, (width, height))
+        for each in cv2.split(smooth(small, (share > 0.5 * share.max()).astype(np.float32)))
+    ]
+    kinds = np.linalg.norm(centers[:, None, :4] - centers[None, :, :4], axis=-1) / UNLIKE
+    cost = np.where(hole[..., None], np.dstack(wide), own) @ (1 - np.exp(-(kinds**2)))
+    cost -= cost.min(-1, keepdims=True)
+    return Regions(number.astype(np.float32), np.asarray(REGION_COST * cost, np.float32))
+
+
+def _looks(rgb: F32, known: F32) -> F32:
+    """(h, w, 4) the colour of what is `known` (h, w) around each place, and how rough it is."""
+    lab = cv2.cvtColor(np.clip(rgb, 0, 255).astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+    colour = _mean(np.asarray(lab, np.float32), known, LOOK)
+    steps = np.abs(lab[..., :1] - colour[..., :1])
+    return np.dstack([colour, ROUGH * _mean(steps, known, 2 * LOOK)])
+
+
+def _mean(values: F32, known: F32, sigma: float) -> F32:
+    """(h, w, C) of values (h, w, C) around each place."""
+    share = np.maximum(cv2.GaussianBlur(known, (0, 0), sigma), np.float32(1e-3))
+    means = [cv2.GaussianBlur(v * known, (0, 0), sigma) / share for v in cv2.split(values)]
+    return np.asarray(np.dstack(means), np.float32)

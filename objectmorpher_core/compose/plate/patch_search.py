@@ -7,8 +7,9 @@ Barnes et al. 2009); then every pixel of the hole takes the mean of what the pat
 Sources are pixels of layers: the picture and changed copies of it, such as its mirror image, all
 of one size. Patches are (size, size) with an odd size; arrays that hold them have a rim of half a
 patch around the picture, so that pixel (i, j) is the middle of [i : i + size, j : j + size].
-Guidance, (h, w, 3) or (L, h, w, 3): the number of the line that a pixel lies beside or 0, how far
-beside it in px, and a bit for each hint that holds there.
+Guidance, (h, w, 3 + K) wanted and (L, h, w, 4) offered: the number of the line that a pixel lies
+beside or 0, how far beside it in px, a bit for each hint that holds there, and what a source from
+each of K regions costs, or the number of the region that it is of.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ def _penalty(wanted, offered, barred, source):
         penalty += LINE_COST * gap * gap
     if wanted[2] > 0 and (np.int64(wanted[2]) & np.int64(offered[source][2])) == 0:
         penalty += HINT_COST
+    if len(wanted) > 3:  # there are regions
+        penalty += wanted[3 + np.int64(offered[source][3])]
     return np.float32(penalty)
 
 

@@ -24,7 +24,9 @@ from ..blend import Box, distance
 from .residue import (
     BLACK,
     TINTED,
+    Erased,
     Ghost,
+    erased_by,
     find_ghosts,
     find_residue,
     keeps_shade,
@@ -231,6 +233,13 @@ def plate_of_holes(
     x0, y0, x1, y1 = plate.box
     pixels = np.where(hole[..., None], plate.pixels, document.photo.pixels[y0:y1, x0:x1])
     return replace(plate, pixels=pixels, hole=hole, painted=painted)
+
+
+def erased_beside(document: Document, holes: tuple[Matte, ...]) -> tuple[Erased, ...]:
+    """What the edit takes off the photo beside the outlines of what stood in these `holes`."""
+    margin = hole_margin(*document.photo.size)
+    ghosts = find_ghosts(document, SEAM * margin)
+    return erased_by(document, ghosts, shown_shares(document, ghosts, holes), margin)
 
 
 def shaded_plate(

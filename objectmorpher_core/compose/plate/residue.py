@@ -383,16 +383,97 @@ def with_parts(mask: Mask, document: Document, parts: Sequence[Ghost], margin: f
 
     Of a piece only that is added which the background does not look like: it has a seam around it.
     """
-    grown, plate = mask.copy(), document.plate
-    assert plate is not None, "pieces are of a plate"
+    grown = mask.copy()
     for part in parts:
-        x0, y0, x1, y1 = part.box
-        inner = (slice(plate.top + y0, plate.top + y1), slice(plate.left + x0, plate.left + x1))
-        seen, behind = document.photo.pixels[inner], plate.pixels[y0:y1, x0:x1]
-        unlike = np.abs(unit_pixels(seen) - unit_pixels(behind)).max(-1)
-        grown[inner] |= part.there & (cv2.blur(unlike, (3, 3)) > 2 * VISIBLE)
+        grown[_in_photo(part, document)] |= _unlike_fill(part, document)
     added = grown & ~mask
     reach = int(np.ceil(margin)) + 1
     near = disc(reach)
     joined = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, near) > 0
     return grown | (joined & (cv2.dilate(added.astype(np.uint8), near) > 0))
+
+
+def _in_photo(ghost: Ghost, document: Document) -> tuple[slice, slice]:
+    """Rows and columns of the photo."""
+    plate = document.plate
+    assert plate is not None, "pieces are of a plate"
+    x0, y0, x1, y1 = ghost.box
+    return slice(plate.top + y0, plate.top + y1), slice(plate.left + x0, plate.left + x1)
+
+
+def _unlike_fill(ghost: Ghost, document: Document) -> Mask:
+    """(h, w) of its box: the px that show it, and not the seam around it."""
+    plate, (x0, y0, x1, y1) = document.plate, ghost.box
+    assert plate is not None, "pieces are of a plate"
+    seen, behind = document.photo.pixels[_in_photo(ghost, document)], plate.pixels[y0:y1, x0:x1]
+    unlike = np.abs(unit_pixels(seen) - unit_pixels(behind)).max(-1)
+    return ghost.there & (cv2.blur(unlike, (3, 3)) > 2 * VISIBLE)
+
+
+# What of it an edit takes away: those who do not see the photo while they edit are to know.
+
+LIKE = 6.0  # levels of CIE Lab, between a px and the nearest of its object's colours
+MOSTLY, OWN = 0.9, 0.4  # shares of a part's px that are so like, and nearer than the background's
+COLORS = 3_000  # px whose colours stand for all
+
+
+@dataclass(frozen=True)
+class Erased:
+    """What is taken off the photo beside an object's outline."""
+
+    owner: int  # index of the object
+    px: int  # that anybody would see
+    like_px: int  # of these, in pieces that look like parts of the object rather than shadows
+    place: tuple[int, int]  # x, y px of the photo, inside the largest piece: like it, if any is
+
+
+def erased_by(
+    document: Document, ghosts: Sequence[Ghost], shares: Sequence[float], margin: float
+) -> tuple[Erased, ...]:
+    """What is gone of the ghosts, whose `shares` are shown, by its object; nothing small.
+
+    `margin` is the photo's `hole_margin`, px.
+    """
+    parts, least = left_out(document, ghosts, margin), (LEAST_PART * margin) ** 2
+    gone = [g for g, share in zip(ghosts, shares, strict=True) if share > 0]
+    found = []
+    for owner in sorted({g.owner for g in gone}):
+        pieces = [(g, _unlike_fill(g, document)) for g in gone if g.owner == owner]
+        like = [(g, own) for g, own in pieces if g in parts and own.sum() >= least]
+        like = [(g, own) for g, own in like if _is_like_owner(g, own, document)]
+        px, like_px = (sum(int(own.sum()) for _, own in some) for some in (pieces, like))
+        if px >= least:
+            place = _inmost(max(like or pieces, key=lambda piece: piece[1].sum()), document)
+            found.append(Erased(owner, px, like_px, place))
+    return tuple(found)
+
+
+def _is_like_owner(ghost: Ghost, own: Mask, document: Document) -> bool:
+    """Whether what shows it, `own` (h, w) of its box, has colours of its object's own."""
+    photo, plate = document.photo.pixels, document.plate
+    mask = document.objects[ghost.owner].mask
+    if mask is None or plate is None:
+        return False
+    seen = _colors(photo[_in_photo(ghost, document)], own)
+    to_own, to_fill = (
+        KDTree(colors).query(seen)[0]
+        for colors in (_colors(photo, mask), _colors(plate.pixels, plate.hole))
+    )
+    return float((to_own < LIKE).mean()) >= MOSTLY and float((to_own < to_fill).mean()) >= OWN
+
+
+def _colors(pixels: Pixels, there: Mask) -> F32:
+    """(n, 3) CIE Lab of some px that are `there` (h, w)."""
+    places = np.flatnonzero(there)
+    rows, columns = np.unravel_index(places[:: len(places) // COLORS + 1], there.shape)
+    rgb = unit_pixels(pixels[rows, columns])
+    return np.asarray(cv2.cvtColor(rgb[None], cv2.COLOR_RGB2LAB)[0], np.float32)
+
+
+def _inmost(piece: tuple[Ghost, Mask], document: Document) -> tuple[int, int]:
+    """x, y px of the photo."""
+    ghost, own = piece
+    depth = cv2.distanceTransform(np.pad(own, 1).astype(np.uint8), cv2.DIST_L2, 5)
+    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+    rows, columns = _in_photo(ghost, document)
+    return int(column) - 1 + columns.start, int(row) - 1 + rows.start

@@ -35,6 +35,14 @@ class PatchTone:
 
 
 @dataclass(frozen=True, eq=False)
+class Regions:
+    """Of what a picture's parts are, and what it costs to fill each place from them."""
+
+    number: F32  # (h, w) the region of a source, from 0 on
+    cost: F32  # (h, w, K) squared levels of 255, of a source from each region
+
+
+@dataclass(frozen=True, eq=False)
 class Guide:
     """The guide of one picture (h, w)."""
 
@@ -42,14 +50,15 @@ class Guide:
     lines: tuple[Line, ...] = ()
     hints: tuple[Hint, ...] = ()  # the last ones win
     tone: PatchTone | None = None
+    regions: Regions | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class PatchGuide:
     """A guide at one size, as `patch_search` reads it; the second layer is the mirror image."""
 
-    wanted: F32  # (h, w, 3)
-    offered: F32  # (2, h, w, 3)
+    wanted: F32  # (h, w, 3 + K)
+    offered: F32  # (2, h, w, 4)
     unlikely: F32  # (2, h, w)
     tone: PatchTone  # of no values where none is asked for
 
@@ -71,6 +80,13 @@ def guidance(guide: Guide, hole: Mask) -> PatchGuide:
                 numbers[inside, 2] += 1 << k
     resized = cv2.resize(guide.unlikely, (width, height), interpolation=cv2.INTER_AREA)
     unlikely = np.asarray(resized, np.float32)
+    number = np.zeros((height, width), np.float32)
+    if guide.regions is not None:
+        size, cost = (width, height), guide.regions.cost
+        number = cv2.resize(guide.regions.number, size, interpolation=cv2.INTER_NEAREST)
+        costs = [cv2.resize(c, size, interpolation=cv2.INTER_AREA) for c in cv2.split(cost)]
+        wanted = np.asarray(np.dstack([wanted, *costs]), np.float32)
+    offered = np.asarray(np.dstack([offered, number]), np.float32)
     mirrored = offered[:, ::-1].copy()
     mirrored[..., :2] = 0  # no line goes on mirrored
     if guide.tone is None:

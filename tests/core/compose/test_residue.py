@@ -19,6 +19,7 @@ from objectmorpher_core.compose.plate import plate as plates
 from objectmorpher_core.compose.plate.plate import (
     SEAM,
     build_plate,
+    erased_beside,
     hole_margin,
     plate_cover,
     plate_crop,
@@ -143,6 +144,18 @@ def footless() -> Document:
     x0, y0, x1, y1 = matte.box
     covered[y0:y1, x0:x1] = matte.alpha > 0
     return edits.set_plate(document, build_plate(pixels, covered, compose.load("telea")))
+
+
+def test_what_is_erased_beside_the_outline_is_counted_and_found(footless: Document):
+    """A report and the command line say it: nobody sees it there."""
+    _, _, own = _scene("patch", "astronaut", "street")
+    missed = own & (_away(_missing(own, "foot")) > 0)
+    away = edits.set_placement(footless, 0, Placement(move=(0.0, -120.0)))
+    (found,) = erased_beside(away, holes(away))
+    x, y = found.place
+    assert missed[y, x] and found.owner == 0
+    assert 0.5 * missed.sum() < found.like_px <= found.px < 1.5 * missed.sum()
+    assert erased_beside(footless, holes(footless)) == ()
 
 
 @pytest.mark.slow
