@@ -143,7 +143,7 @@ def find_regions(rgb: F32, hole: Mask) -> Regions:
     """
     known = (~hole).astype(np.float32)
     looks = _looks(rgb, known)
-    places = np.dstack(np.indices(hole.shape, np.float32)) / np.sqrt(max(hole.sum(), 1))
+    places = np.stack(np.indices(hole.shape, np.float32), -1) / np.sqrt(max(hole.sum(), 1))
     spread = np.linalg.norm(looks[~hole].std(0))
     features = np.dstack([looks, PLACE * spread * places])
     samples = np.ascontiguousarray(features[~hole][:: (~hole).sum() // SAMPLES + 1], np.float32)
