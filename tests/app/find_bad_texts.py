@@ -19,16 +19,17 @@ import numpy as np
 from imgui_bundle import imgui
 
 from objectmorpher.cli.options import WindowOptions
-from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Popup, ToolName
 from objectmorpher.gui.window.glfw_window import open_window
 from objectmorpher.gui.window.window import Window
+from objectmorpher.tools.pointer import Button
 from objectmorpher_core.document.model import Document
 from shoot_views import made_document
 
 FRAMES = 4  # ImGui lays out in two; fades are off
 CUT = 1.5  # px that a letter reaches past what is shown of its window
 COVERED = 0.3  # of a letter's own box, by another text's letter
+TURNED = 20.0  # canvas px that the pointer turns an object by
 SHADOW = 2.5  # px between a letter and its own dark outline
 VERTEX = np.dtype([("place", "<f4", 2), ("uv", "<f4", 2), ("color", "<u4")])
 
@@ -107,21 +108,43 @@ def document() -> Document:
     return made_document()
 
 
-def states(editor: Editor) -> Iterator[str]:
+def states(window: Window) -> Iterator[str]:
     """Puts the editor into one state after the other."""
-    view = editor.view
+    editor, view = window.editor, window.editor.view
     yield "start"
     editor.start(document())
     for tool in ToolName:
         view.tool = tool
         yield tool.value
-    view.has_history = True
+    yield from at_the_edges(window)
+    view.split = 0.02
+    yield "split"
+    view.split, view.has_history = None, True
     editor.say("Something has happened that is worth a whole sentence of the last line")
     yield "history and message"
     view.has_history, editor.message = False, None
     for popup in Popup:
         view.popup = popup
         yield popup.value
+
+
+def at_the_edges(window: Window) -> Iterator[str]:
+    """What stands beside a pointer: what it is on, and while it turns the object."""
+    editor, hand = window.editor, window._input
+    view, tool = editor.view, editor.view.tool
+    for across, down in ((-1, 0), (1, 0), (1, 1)):
+        view.tool = ToolName.COMPOSE
+        hand.crosshair.move(editor, across * view.width, down * view.height)
+        yield f"compose at {across}, {down}"
+        view.tool = ToolName.PLACE
+        hand._press(editor, Button.LEFT)
+        hand.crosshair.move(editor, -across * TURNED, -TURNED)
+        yield f"turn at {across}, {down}"
+        hand.crosshair.move(editor, across * TURNED, TURNED)
+        yield f"turn back to {across}, {down}"
+        editor.hand.abort(editor)
+        hand.crosshair.hide()
+    view.tool = tool
 
 
 def main() -> None:
@@ -136,7 +159,7 @@ def look(size: str) -> None:
     window = Window(options, open_window(options))
     window.editor.settings = replace(window.editor.settings, motion="reduced")
     imgui.get_style().anti_aliased_lines = False
-    for state in states(window.editor):
+    for state in states(window):
         for _ in range(FRAMES):
             window._frame()
             imgui.get_style().anti_aliased_lines = False

@@ -15,6 +15,7 @@ DARK = "#0B0C0E"
 WHITE = "#FFFFFF"
 ACCENT = "#5AA9FF"  # of marks on the photo, in either theme
 WARM = "#F2695C"
+DOTTED = 14.0  # points that a disc before a label takes
 
 
 class CanvasPainter:
@@ -129,11 +130,24 @@ class CanvasPainter:
         self.draw.add_circle(at, radius, theme.u32(DARK, 0.7 * alpha), 0, theme.pt(3))
         self.draw.add_circle(at, radius, theme.u32(color, alpha), 0, theme.pt(1.2))
 
-    def label(self, text: str, x: float, y: float, side: float = 0.0) -> None:
-        """White on dark, at a window position; `side`: 0 begins at x, 0.5 centred, 1 ends there."""
-        size = imgui.calc_text_size(text)
-        pad_x, pad_y = theme.pt(8), theme.pt(4)
-        left = x - side * (size.x + 2 * pad_x)
-        low, high = ImVec2(left, y), ImVec2(left + size.x + 2 * pad_x, y + size.y + 2 * pad_y)
+    def label(self, text: str, x: float, y: float, side: float = 0.0, dot: str = "") -> None:
+        """White on dark, at a window position or, where the canvas ends before, beside it.
+
+        `side`: 0 begins at x, 0.5 centred, 1 ends there; `dot`: colour of a disc before it.
+        """
+        size, rect, pad_y = imgui.calc_text_size(text), self.rect, theme.pt(4)
+        width, height = self.label_width(text), size.y + 2 * pad_y
+        ahead = theme.pt(DOTTED) if dot else 0.0
+        left = x + ahead - side * width
+        left = max(min(left, rect.x + rect.width - width), rect.x + ahead)
+        y = max(min(y, rect.y + rect.height - height), rect.y)
+        if dot:
+            self.disc(ImVec2(left + theme.pt(4) - ahead, y + theme.pt(8)), 4, dot)
+        low, high = ImVec2(left, y), ImVec2(left + width, y + height)
         self.draw.add_rect_filled(low, high, theme.u32(DARK, 0.75), theme.pt(4))
-        self.draw.add_text(ImVec2(left + pad_x, y + pad_y), theme.u32(WHITE), text)
+        self.draw.add_text(ImVec2(left + theme.pt(8), y + pad_y), theme.u32(WHITE), text)
+
+    @staticmethod
+    def label_width(text: str) -> float:
+        """Window units."""
+        return imgui.calc_text_size(text).x + 2 * theme.pt(8)

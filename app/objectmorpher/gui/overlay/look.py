@@ -63,5 +63,7 @@ def draw_comparison(canvas: CanvasPainter) -> None:
     grip = ImVec2(x, rect.y + rect.height / 2)
     canvas.draw.add_circle_filled(grip, theme.pt(9), theme.u32(DARK, 0.7))
     canvas.draw.add_circle_filled(grip, theme.pt(7), theme.u32(WHITE))
-    canvas.label(t("Before"), x - theme.pt(12), top, side=1.0)
-    canvas.label(t("After"), x + theme.pt(12), top)
+    left = x - rect.x
+    for text, side, room in ((t("Before"), 1.0, left), (t("After"), 0.0, rect.width - left)):
+        if canvas.label_width(text) + theme.pt(12) <= room:
+            canvas.label(text, x + theme.pt(12) * (1 - 2 * side), top, side)

@@ -145,23 +145,24 @@ def _draw_value(canvas: CanvasPainter, part: str | None) -> None:
     else:
         text = {"yaw": t("Yaw"), "pitch": t("Pitch"), "roll": t("Roll")}.get(part, "")
     if text:
-        at = canvas.on_canvas(pointer.xy)[0]
-        canvas.label(text, at.x + theme.pt(BESIDE[0]), at.y + theme.pt(BESIDE[1]))
-        if editor.hand.is_busy and part in (*TURNS, "turn", "ball"):
-            _draw_trust(canvas, at)
+        at, rect = canvas.on_canvas(pointer.xy)[0], canvas.rect
+        is_turned = editor.hand.is_busy and part in (*TURNS, "turn", "ball")
+        lines = BELOW * (2 if is_turned else 1)
+        y = min(at.y + theme.pt(BESIDE[1]), rect.y + rect.height - theme.pt(lines + 2))
+        canvas.label(text, at.x + theme.pt(BESIDE[0]), y)
+        if is_turned:
+            _draw_trust(canvas, at.x + theme.pt(BESIDE[0]), max(y, rect.y) + theme.pt(BELOW))
 
 
-def _draw_trust(canvas: CanvasPainter, at: ImVec2) -> None:
-    """Below the value: how far the turned object is to be believed."""
+def _draw_trust(canvas: CanvasPainter, x: float, y: float) -> None:
+    """Below the value, at a window position: how far the turned object is to be believed."""
     from objectmorpher_core.raster.trust import trust_in
 
     editor = canvas.editor
     assert editor.document is not None, "its object is being turned"
     sign = trust_in(editor.derived.draft(editor.document, editor.current)).sign
     words = {"fine": t("Fine"), "look closely": t("Look closely"), "guesswork": t("Guesswork")}
-    x, y = at.x + theme.pt(BESIDE[0]), at.y + theme.pt(BESIDE[1] + BELOW)
-    canvas.disc(ImVec2(x + theme.pt(4), y + theme.pt(8)), 4, TRUST[sign])
-    canvas.label(words[sign], x + theme.pt(14), y)
+    canvas.label(words[sign], x, y, dot=TRUST[sign])
 
 
 def _value(part: str, placement: Placement, placing: Placing) -> str:
