@@ -143,7 +143,8 @@ def find_regions(rgb: F32, hole: Mask) -> Regions:
     """
     known = (~hole).astype(np.float32)
     looks = _looks(rgb, known)
-    places = np.stack(np.indices(hole.shape, np.float32), -1) / np.sqrt(max(hole.sum(), 1))
+    rows, columns = np.mgrid[: hole.shape[0], : hole.shape[1]].astype(np.float32)
+    places = np.dstack([rows, columns]) / np.sqrt(max(hole.sum(), 1))
     spread = np.linalg.norm(looks[~hole].std(0))
     features = np.dstack([looks, PLACE * spread * places])
     samples = np.ascontiguousarray(features[~hole][:: (~hole).sum() // SAMPLES + 1], np.float32)
