@@ -71,7 +71,9 @@ def quilted(levels: F32, known: Mask, clear: Mask, hole: Mask, heights: F32, see
     costs = frozen(odd, np.float64), USED * usual, chance
     taken = _quilt(detail, known & ~hole, frozen(wanted), *fields, frozen(places), order, costs)
     gain = ((_grey(low) + DARK) / (_grey(taken) + DARK)).clip(*GAIN)
-    off = np.asarray(cv2.GaussianBlur(taken - low, (0, 0), NEARBY), np.float32)
+    made_of = wanted.astype(np.float32)
+    off = cv2.GaussianBlur((taken - low) * made_of[..., None], (0, 0), NEARBY)
+    off /= np.maximum(cv2.GaussianBlur(made_of, (0, 0), NEARBY), 1e-3)[..., None]
     gain *= np.exp(-((3 * _grey(off * off) / OTHER**2) ** 2))
     made = levels + plain[..., None] * (low + gain[..., None] * detail - levels)
     made = made.clip(levels[known].min(0), levels[known].max(0))

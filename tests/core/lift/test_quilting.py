@@ -57,6 +57,15 @@ def test_a_plain_hole_gets_the_texture_beside_it(name):
     assert found.min() >= whole.min() and found.max() <= whole.max()
 
 
+@pytest.mark.parametrize("name", ["grass", "gravel"])
+def test_a_hole_is_textured_up_to_its_border(name):
+    """There is no plain strip along it: as rough there as amid it."""
+    whole, hole = _texture(name), _hole()
+    inner, core = (cv2.erode(hole.astype(np.uint8), np.ones((n, n), np.uint8)) > 0 for n in (3, 9))
+    found = _filled(_even(whole, hole), hole)
+    assert _contrast(found, inner & ~core) > 0.8 * _contrast(found, core)
+
+
 def test_what_is_rougher_than_the_rest_stays():
     whole, hole = _texture("grass"), _hole()
     rough = np.where(hole[..., None], whole, 0.1 * whole + 80)
