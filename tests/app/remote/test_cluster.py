@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 from same_values import same_values
 
+from objectmorpher.server import client
 from objectmorpher.server.address import Address, NotServed, ServedError, Server
 from objectmorpher.server.client import call, hello
 from objectmorpher.worker import job_functions
@@ -146,28 +147,11 @@ def test_a_lift_is_what_it_is_here_to_the_last_bit(
     assert len(steps) > 3
 
 
-def test_a_job_whose_process_is_killed_is_done_by_the_other_one_with_the_same_answer(
-    serving: Serving, photo: np.ndarray, mask: np.ndarray
-) -> None:
-    arguments = photo, mask, BackendChoice("auto", 3), 2
-    killed: list[int] = []
-
-    def kill(fraction: float, note: str) -> None:
-        if not killed and fraction >= 0.5:  # one background of two is ready
-            killed.append(serving.pids[-1])
-            assert killed[0] in descendants(os.getpid())
-            os.kill(killed[0], signal.SIGKILL)
-
-    answer = call(serving.server, "fill_variants", arguments, kill)
-    assert killed
-    assert len(serving.pids) >= 2
-    assert serving.pids[-1] not in killed
-    assert same_values(answer, job_functions.fill_variants(*arguments, progress=silent))
-
-
 def test_two_processes_work_at_a_time_and_a_third_job_waits(
-    serving: Serving, photo: np.ndarray, mask: np.ndarray
+    serving: Serving, photo: np.ndarray, mask: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # On a busy machine the third may wait longer than the window does before it works here.
+    monkeypatch.setattr(client, "QUEUE", 300.0)
     arguments = photo, mask, BackendChoice("auto", 5), 2
     answers: list[Any] = []
 
@@ -178,7 +162,7 @@ def test_two_processes_work_at_a_time_and_a_third_job_waits(
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(120)
+        thread.join(300)
     assert len(answers) == 3
     assert all(same_values(answer, answers[0]) for answer in answers)
     assert len(set(serving.pids[-3:])) == 2
@@ -245,3 +229,22 @@ def test_a_stage_that_is_not_served_is_refused(server: Server, photo: np.ndarray
     edit = CoarseEdit(0, 0, photo, photo, np.ones((300, 450), np.float32))
     with pytest.raises(NotServed, match="does not refine"):
         call(server, "refine", (edit, RefineOptions("auto")), silent)
+
+
+def test_a_job_whose_process_is_killed_is_done_by_the_other_one_with_the_same_answer(
+    serving: Serving, photo: np.ndarray, mask: np.ndarray
+) -> None:
+    arguments = photo, mask, BackendChoice("auto", 3), 2
+    killed: list[int] = []
+
+    def kill(fraction: float, note: str) -> None:
+        if not killed and fraction >= 0.5:  # one background of two is ready
+            killed.append(serving.pids[-1])
+            assert killed[0] in descendants(os.getpid())
+            os.kill(killed[0], signal.SIGKILL)
+
+    answer = call(serving.server, "fill_variants", arguments, kill)
+    assert killed
+    assert len(serving.pids) >= 2
+    assert serving.pids[-1] not in killed
+    assert same_values(answer, job_functions.fill_variants(*arguments, progress=silent))
