@@ -81,8 +81,8 @@ class Rules(NamedTuple):
     brim_start: float = 0.22
     brim_end: float = 0.42
     # Of edged shapes it goes on over what turns into view, and fades when it is seen edge-on.
-    edged_start: float = 0.5
-    edged_end: float = 0.8
+    edged_start: float = 0.2
+    edged_end: float = 0.42
 
     # Where the motion magnifies the photo, the matte's edge would become a translucent band:
     # below matte_start the surface's own edge takes over from the matte's, wholly at matte_end.
@@ -107,7 +107,7 @@ class Rules(NamedTuple):
 
     # Where an invented picture shows the surface, too, it takes the photo's place from this ratio
     # of the cosines on: of the normal with the way to the photo's camera, to that now.
-    look_aside: float = 0.4  # = streak_start: nothing of the photo has faded before
+    look_aside: float = 0.6  # = streak_start: nothing of the photo has faded before
 
     # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below streak_start
     # the photo's pixels begin to show as streaks, below streak_end they are not used.

@@ -24,7 +24,7 @@ RIM_BLUR = 0.5  # x mean spacing, of the rim's texture
 RIM = (0.08, 0.28)  # x local radius from the outline: where the rim's own texture ends
 BACK_SIDE = 200  # px, longer side of the picture in which the rim's texture is grown
 HIDDEN_SIDE = 400  # px, likewise for what was hidden
-EVEN = 0.04  # x the root of the area, over which what replaces a fringe is evened
+EVEN = 0.015  # x the root of the area, over which what replaces a fringe is evened
 SURE = 0.95  # alpha from which a pixel is the object's
 
 

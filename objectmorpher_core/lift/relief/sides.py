@@ -39,19 +39,21 @@ from .colours import fill_in
 from .quilting import quilted
 from .silhouette import inwardness
 
-AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
+AWAY = 35.0  # degrees: sides that this turn shows are textured as they look after it
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
 # Ratio of the cosines then and now, down to which the photo goes on beyond where it is shown, so
 # that both agree where they meet: of a turn by 22 degrees and more.
 PINNED = 0.25
-FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
+FACING = 0.15  # cosine of a normal with the way to the camera, from which a picture shows it
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
-LONGEST = 400.0  # px, longer side of the object in a picture
+LONGEST = 800.0  # px, longer side of the object in a picture
 SEARCH = 9_000  # px of the small picture in which patches are looked for
 LEAST = 40  # px of a hole, or of what is around it
 SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
 HALF = 0.5  # alpha of the matte, to which its own colours are sure enough; of a share, likewise
 EDGE = 1  # px of what is known beside a hole that are filled anew: they are mixed with it
+CLEAR = 0.4  # shrinking of the photo's area, down to which it may be seen elsewhere
+OWN = 0.9  # of the matte's fringe, from which colours are the object's own
 RIM = 4  # small px of the object's edge that are no source, for what is beyond is in their patches
 STRANGE = 20_000.0  # squared levels that they cost
 FAR = 1_500.0  # squared levels that a source costs ...
@@ -65,6 +67,10 @@ NEARLY = 1.1  # x the share of a picture of about the right colours: what exceed
 OTHER = 30.0  # levels, by which the coarse colours of a picture of something else are off
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
 INWARD = 0.4  # of the matte's fringe, up to which its colours are not the object's
+EVEN, SMOOTH = 3.0, 8.0  # px, over which the border at which the photo is mirrored is evened
+LIKE, UNLIKE = 8.0, 50.0  # px over which its colours are compared; levels by which others are off
+BENT = 2.5  # of its area, by which it may be larger or smaller
+STRIKING = 40.0  # levels, by which what stands out is unlike its surroundings
 MIX = 2  # px beside a hole that are no texture: they are mixed with it
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
 BEFORE = 3.0  # x spacing, by which what stands before something is nearer
@@ -133,12 +139,15 @@ class _View:
         is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
         looks = self._looks(picture, photo)
         at = (looks - [matte.left, matte.top] - 0.5).astype(np.float32)
-        is_known &= cv2.remap(matte.alpha, at[..., 0], at[..., 1], cv2.INTER_LINEAR) > HALF
+        at_xy = at[..., 0], at[..., 1]
+        is_known &= cv2.remap(matte.alpha, *at_xy, cv2.INTER_LINEAR) > HALF
         across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
         area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
-        is_clear = area * (self.camera.focal / photo.focal) ** 2 > RULES.look_aside
+        is_own = area * (self.camera.focal / photo.focal) ** 2 > CLEAR
+        is_own &= is_known & (cv2.remap(inwardness(matte.alpha), *at_xy, cv2.INTER_LINEAR) > OWN)
+        is_clear = is_own & ~_standing_out(255 * straight, is_own)
         return _Picture(
-            straight.clip(0, 1), picture.alpha > 0.5, is_known, is_known & is_clear, picture.depth
+            straight.clip(0, 1), picture.alpha > 0.5, is_known, is_own, is_clear, picture.depth
         )
 
     def _looks(self, picture: Picture3D, photo: Camera) -> F64:
@@ -159,7 +168,8 @@ class _Picture:
     colors: F32  # (h, w, 3) straight, in [0, 1]; coarse where nothing is known
     is_object: Mask  # (h, w)
     is_known: Mask  # (h, w)
-    is_clear: Mask  # (h, w) of that, what is not so drawn out that it would be seen elsewhere
+    is_own: Mask  # (h, w) of that, what is neither drawn out nor a fringe
+    is_clear: Mask  # (h, w) of that, what may be seen elsewhere, for it does not stand out
     depth: F32  # (h, w) world units
 
 
@@ -383,8 +393,52 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     clear = (known & picture.is_clear).astype(np.uint8)
     clear = cv2.erode(clear, np.ones((2 * MIX + 1,) * 2, np.uint8)) > 0
     heights = np.asarray(cv2.resize(tone[..., -1], hole.shape[::-1]) / HEIGHT, np.float32)
-    filled = np.rint(quilted(filled, known, clear, hole, heights, seed))
-    return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
+    filled = quilted(filled, known, clear, hole, heights, seed)[: len(side.is_wanted), :width]
+    mirrored, share = _mirrored(side.picture)
+    filled = np.rint(filled + share[..., None] * (mirrored - filled))
+    return np.asarray(filled.clip(0, 255), np.uint8)
+
+
+def _mirrored(picture: _Picture) -> tuple[F32, F32]:
+    """What is clear of a picture (h, w, 3), mirrored at its border; and (h, w) how well it fits.
+
+    So hair, peel and cloth go on as they are where they end. What stands out, an eye or a nose, is
+    not there twice. Colours unlike those that are expected do not fit, either, nor what a curved
+    border bends.
+    """
+    inner = cv2.GaussianBlur(picture.is_own.astype(np.float32), (0, 0), EVEN) > 0.5
+    away = cv2.distanceTransform((~inner).astype(np.uint8), cv2.DIST_L2, 5)
+    down, across = np.gradient(cv2.GaussianBlur(away, (0, 0), SMOOTH))
+    back = -2 * away / np.maximum(np.hypot(across, down), 1e-3)
+    rows, columns = np.mgrid[: away.shape[0], : away.shape[1]].astype(np.float32)
+    x, y = (columns + back * across).astype(np.float32), (rows + back * down).astype(np.float32)
+    (x_down, x_across), (y_down, y_across) = np.gradient(x), np.gradient(y)
+    area = cv2.GaussianBlur(x_down * y_across - x_across * y_down, (0, 0), EVEN)
+    fits = cv2.remap((inner & picture.is_clear).astype(np.uint8), x, y, cv2.INTER_NEAREST) > 0
+    fits &= picture.is_object & ~inner & (area > 1 / BENT) & (area < BENT)
+    levels = 255 * picture.colors
+    mirrored = np.asarray(cv2.remap(levels, x, y, cv2.INTER_LINEAR), np.float32)
+    expected = _mean(levels, picture.is_object, LIKE)
+    off = np.linalg.norm(_mean(mirrored, fits, LIKE) - expected, axis=-1)
+    share = (fits * np.exp(-((off / UNLIKE) ** 4))).astype(np.float32)
+    return mirrored, np.asarray(cv2.GaussianBlur(share, (0, 0), EVEN) * ~inner, np.float32)
+
+
+def _standing_out(levels: F32, where: Mask) -> Mask:
+    """(h, w) what is small and unlike its surroundings, of `levels` (h, w, 3) `where` (h, w)."""
+    off = np.linalg.norm(_mean(levels, where, LIKE) - _mean(levels, where, 3 * LIKE), axis=-1)
+    size = 2 * round(2 * LIKE) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return cv2.dilate((off * where > STRIKING).astype(np.uint8), disc) > 0
+
+
+def _mean(levels: F32, where: Mask, sigma: float) -> F32:
+    """(h, w, 3) local means of `levels` (h, w, 3) over `where` (h, w)."""
+    weight = where.astype(np.float32)
+    total = cv2.GaussianBlur(levels * weight[..., None], (0, 0), sigma)
+    return np.asarray(
+        total / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-3)[..., None], np.float32
+    )
 
 
 def _heights(side: _Side, front: _Picture, size: tuple[int, int]) -> F32:

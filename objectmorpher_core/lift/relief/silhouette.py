@@ -223,7 +223,7 @@ MIXED = 0.03, 0.97  # alpha of what is soft
 CRISP = (
     1.0  # px of that, across an edge as crisp as any: of drawn solids 0.7 to 1, of photos 4 to 8
 )
-DEEP = 8.0  # x what is soft beyond that: light from behind reaches farther in than softness does
+DEEP = 2.5  # x what is soft beyond that: light from behind reaches farther in than softness does
 AROUND = 0.03  # x the root of the area, along the outline: what is as wide
 MOST = 0.08  # x the root of the area
 OF_RADIUS, THIN = 0.35, 2.0  # x the radius of a limb, at most; px, of what is as thin as a hair
