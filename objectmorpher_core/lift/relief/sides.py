@@ -46,7 +46,7 @@ TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0
 PINNED = 0.25
 FACING = 0.15  # cosine of a normal with the way to the camera, from which a picture shows it
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
-LONGEST = 800.0  # px, longer side of the object in a picture
+LONGEST = 600.0  # px, longer side of the object in a picture
 SEARCH = 9_000  # px of the small picture in which patches are looked for
 LEAST = 40  # px of a hole, or of what is around it
 SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
@@ -77,6 +77,15 @@ BEFORE = 3.0  # x spacing, by which what stands before something is nearer
 BEHIND = 0.01  # share of a side's Gaussians, from which what something hides has a picture
 MOST_TONED = 25.0  # levels, by which a side's tone follows the photo's where they meet
 GAP = 32  # px between the matte and the pictures, and between them
+
+
+@dataclass(frozen=True, eq=False)
+class _Shot:
+    """What the photo shows of the object."""
+
+    matte: Matte
+    inward: F32  # (h, w) how far inside its fringe a pixel of the matte is
+    camera: Camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,12 +125,12 @@ class _View:
         """How long something of this length, world units, is in the picture, about."""
         return length * self.camera.focal / float(np.median(self.places[:, 2]))
 
-    def drawn(self, rest: RestSplats, matte: Matte, photo: Camera) -> _Picture:
+    def drawn(self, rest: RestSplats, shot: _Shot) -> _Picture:
         """What the photo shows of this view; `rest` has the colours of what it does not.
 
         The outline is the surface's own, and the photo is not faded where it is drawn out.
         """
-        lifted = rest.lifted
+        matte, photo, lifted = shot.matte, shot.camera, rest.lifted
         gaussians, texture = lifted.gaussians, lifted.texture
         carried = np.where(self.is_aside(rest, PINNED), 0.0, texture.visibility)
         own = replace(
@@ -144,7 +153,7 @@ class _View:
         across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
         area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
         is_own = area * (self.camera.focal / photo.focal) ** 2 > CLEAR
-        is_own &= is_known & (cv2.remap(inwardness(matte.alpha), *at_xy, cv2.INTER_LINEAR) > OWN)
+        is_own &= is_known & (cv2.remap(shot.inward, *at_xy, cv2.INTER_LINEAR) > OWN)
         is_clear = is_own & ~_standing_out(255 * straight, is_own)
         return _Picture(
             straight.clip(0, 1), picture.alpha > 0.5, is_known, is_own, is_clear, picture.depth
@@ -206,18 +215,19 @@ class _Side:
 def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
     """`lifted` with pictures of what the photo's `camera` does not see of it."""
     rest = RestSplats(replace(lifted, sides=None), camera)
-    lit = _lit(rest, matte, camera)
+    shot = _Shot(matte, inwardness(matte.alpha), camera)
+    lit = _lit(rest, shot)
     views = [_View.of(rest, camera, turn) for turn in TURNS]
     best = np.argmax([view.cosines for view in views], axis=0)
     is_side = lifted.is_body & (rest.cosines > FARTHEST)
-    front = _View.of(rest, camera, (0.0, 0.0, 0.0)).drawn(lit, matte, camera)
+    front = _View.of(rest, camera, (0.0, 0.0, 0.0)).drawn(lit, shot)
     sides: list[_Side] = []
     for k, view in enumerate(views):
         wanted = (
             (best == k) & (view.cosines > FACING) & view.is_aside(rest, RULES.look_aside) & is_side
         )
         if wanted.sum() >= 3:
-            sides += _layers(k, view, np.flatnonzero(wanted), lit, matte, camera)
+            sides += _layers(k, view, np.flatnonzero(wanted), lit, shot)
     sides = _apart(sides, lifted.world_points(rest.means), APART * rest.spacing)
     filled: list[U8 | None] = [None] * len(sides)
 
@@ -269,33 +279,33 @@ def _carried(
     return replace(lifted, sides=Sides(side_by_side(pictures), *corner, at, slopes, zoom))
 
 
-def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
+def _lit(rest: RestSplats, shot: _Shot) -> RestSplats:
     """With the colours of what is not seen as bright as its normals want it, coarsely.
 
     They are those of the front, which faces elsewhere. The matte's fringe is not seen, either.
     """
     lifted = rest.lifted
-    change = (rest.normals - rest.shown_normals) @ estimate_light(lifted, matte)
+    change = (rest.normals - rest.shown_normals) @ estimate_light(lifted, shot.matte)
     gain = np.exp(change.clip(-BRIGHTEST, BRIGHTEST))[:, None].astype(np.float32)
     colors = (lifted.gaussians.colors * gain).clip(0, 1)
     texture = lifted.texture
-    at = np.asarray(texture.u0 - [matte.left, matte.top] - 0.5, np.float64)
-    is_own = bilinear(inwardness(matte.alpha), at) >= INWARD
+    at = np.asarray(texture.u0 - [shot.matte.left, shot.matte.top] - 0.5, np.float64)
+    is_own = bilinear(shot.inward, at) >= INWARD
     own = replace(
         lifted, gaussians=replace(lifted.gaussians, colors=colors),
         texture=replace(texture, visibility=texture.visibility * is_own),
     )  # fmt: skip
-    return RestSplats(own, photo)
+    return RestSplats(own, shot.camera)
 
 
 def _layers(
-    number: int, view: _View, wanted: np.ndarray, rest: RestSplats, matte: Matte, photo: Camera
+    number: int, view: _View, wanted: np.ndarray, rest: RestSplats, shot: _Shot
 ) -> list[_Side]:
     """What a view shows of the `wanted` Gaussians, and what it shows without what hides others.
 
     The body of a mug is hidden behind its handle in every view: that has a picture without it.
     """
-    whole = view.drawn(rest, matte, photo)
+    whole = view.drawn(rest, shot)
     side = _side(number, view, wanted, whole, rest.spacing)
     behind = np.setdiff1d(wanted, side.index)
     if len(behind) < max(BEHIND * len(wanted), 3):
@@ -308,7 +318,7 @@ def _layers(
     hides[hides] = depth[hides] < depth[behind[which[hides]]] - BEFORE * rest.spacing
     opacities = np.where(hides, 0, lifted.gaussians.opacities).astype(np.float32)
     bare = replace(lifted, gaussians=replace(lifted.gaussians, opacities=opacities))
-    picture = view.drawn(RestSplats(bare, photo), matte, photo)
+    picture = view.drawn(RestSplats(bare, shot.camera), shot)
     sides = [_side(number, view, wanted[~hides[wanted]], picture, rest.spacing)]
     before = side.index[hides[side.index]]
     if len(before) >= 3:
@@ -426,10 +436,15 @@ def _mirrored(picture: _Picture) -> tuple[F32, F32]:
 
 def _standing_out(levels: F32, where: Mask) -> Mask:
     """(h, w) what is small and unlike its surroundings, of `levels` (h, w, 3) `where` (h, w)."""
-    off = np.linalg.norm(_mean(levels, where, LIKE) - _mean(levels, where, 3 * LIKE), axis=-1)
-    size = 2 * round(2 * LIKE) + 1
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    return cv2.dilate((off * where > STRIKING).astype(np.uint8), disc) > 0
+    size = where.shape[1] // 4 + 1, where.shape[0] // 4 + 1  # fine enough, and fast
+    share = cv2.resize(where.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    own = cv2.resize(levels * where[..., None], size, interpolation=cv2.INTER_AREA)
+    there = share > 0.5
+    small = (own / np.maximum(share, 1e-3)[..., None]).astype(np.float32)
+    near, around = (_mean(small, there, sigma / 4) for sigma in (LIKE, 3 * LIKE))
+    striking = (np.linalg.norm(near - around, axis=-1) * there > STRIKING).astype(np.uint8)
+    whole = cv2.resize(cv2.dilate(striking, np.ones((9, 9), np.uint8)), where.shape[::-1])
+    return np.asarray(whole > 0)
 
 
 def _mean(levels: F32, where: Mask, sigma: float) -> F32:
