@@ -210,6 +210,24 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
     return turned(placement, turn_of(matrix), points, lifted, camera, gimbal.down)
 
 
+def grown(placement: Placement, scale: float, item: EditObject, document: Document) -> Placement:
+    """`placement` with another `scale`, about the foot of what stands where it is, bent or not.
+
+    What flies grows from its centre, as does what would pass behind the camera.
+    """
+    lifted, camera = item.lifted, document.photo.camera
+    changed = replace(placement, scale=scale)
+    if lifted is None or not lifted.stands or changed == placement:
+        return changed
+    points, down = lifted.world_points(lifted.body.means), gimbal_of(item, document).down
+    try:
+        standing = scaled(placement, scale, points, lifted, camera, down)
+        standing.matrix(lifted, camera)
+    except ValueError:
+        return changed
+    return standing
+
+
 def is_in_place(item: EditObject, document: Document) -> bool:
     """Whether it is as large as in the photo, and its foot is where it is there, however turned.
 
