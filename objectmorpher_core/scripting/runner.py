@@ -249,12 +249,8 @@ def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
             if trust.sign != SIGNS[0] and _is_in_photo(splats.means, document):
                 is_moved_only = item.pose is None and not any(item.placement.turn)
                 way = "moved" if is_moved_only else "turned"
-                reason = (
-                    f"the photo does not show {trust.invented:.0%} of what is seen of it now"
-                    if trust.invented > trust.risk / 2
-                    else "how deep its parts lie is not sure"
-                )
-                found.append(f"{item.name} is {way} so far that {SAID[trust.sign]}: {reason}")
+                share = f"the photo does not show {trust.invented:.0%} of what is seen of it now"
+                found.append(f"{item.name} is {way} so far that {SAID[trust.sign]}: {share}")
     return tuple(found)
 
 
