@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from editor_steps import CENTRE, lift_ball, open_file, wait_for_jobs
-from objectmorpher.commands import COMMANDS, next_step, run
+from objectmorpher.commands import COMMANDS, next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.view import ToolName
@@ -112,6 +112,20 @@ def test_undo_while_selecting_takes_the_click_back(editor: Editor) -> None:
     wait_for_jobs(editor)
     assert editor.selection.pending is None
     assert editor.mask is None
+
+
+def test_while_an_object_is_lifted_no_one_is_told_to_lift_it(editor: Editor) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    assert why_not(editor, "pose") == "Lift an object first"
+    run(editor, "lift")
+    for name in ("pose", "forward", "bare", "lift"):
+        assert why_not(editor, name) == "The object is being lifted", name
+    editor.choose_tool(ToolName.PLACE)
+    assert editor.message is not None and editor.message.text == "The object is being lifted"
+    editor.jobs.cancel()
+    wait_for_jobs(editor)
+    assert why_not(editor, "pose") == "Lift an object first"
 
 
 def test_an_answer_to_an_old_question_is_dropped(editor: Editor) -> None:

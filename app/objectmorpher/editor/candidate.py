@@ -200,8 +200,8 @@ class Candidates:
         editor.jobs.start(
             "Selecting", job_functions.candidate, photo.pixels,
             edits.beside(document, editor.current, prompt), choice_of(editor),
-            done=accept, failed=fail, cancelled=self._drop, kind=CANDIDATE, is_quiet=True,
-            is_spare=True,
+            done=accept, failed=fail, cancelled=self._drop, replaced=self._pop_wanted,
+            kind=CANDIDATE, is_quiet=True, is_spare=True,
         )  # fmt: skip
 
     def _look_closer(self, shown: Candidate) -> None:
@@ -227,8 +227,9 @@ class Candidates:
         self._pop_wanted()
 
     def _pop_wanted(self) -> Question | None:
+        """What the user asked meanwhile; it is no question any more, unless a newer one is."""
         wanted, self._wanted = self._wanted, None
-        if wanted is not None:
+        if wanted is not None and wanted is self._tasks.question:
             self._tasks.question = None
         return wanted
 

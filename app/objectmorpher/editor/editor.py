@@ -267,11 +267,10 @@ class Editor(EditorState):
         """Changes the tool; the ones that need a lifted object say so."""
         self.hand.abort(self)
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
-            self.say(t("Lift an object first"))
+            self.say(self.why_no_shape)
             return
-        said = self.message
-        if tool is not self.view.tool and said and not said.is_error and said.action is None:
-            self.message = None  # what it says to do next is of the tool that is left
+        if tool is not self.view.tool:
+            self.drop_hint()
         self.view.tool = tool
         self.hover = Hover()
 

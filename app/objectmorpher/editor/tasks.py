@@ -298,13 +298,6 @@ class Tasks:
             kind=f"{READY} {k}", done=accept, failed=editor.complain_of,
         )  # fmt: skip
 
-    @property
-    def is_lifting(self) -> bool:
-        """Whether the current object is on its way."""
-        editor = self._editor
-        is_asked = editor.jobs.is_busy(LIFT)
-        return is_asked or editor.chores.is_busy(f"{READY} {editor.current}")
-
     def _take_lift(self, changed: Document, k: int) -> None:
         editor = self._editor
         self._posing.select(None)
