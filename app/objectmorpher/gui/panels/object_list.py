@@ -93,7 +93,8 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
         imgui.set_cursor_pos_y(top - theme.pt(4))
         keys = keys_of(editor, name)
         hint = t(COMMANDS[name].label) + (f" ({keys})" if keys else "")
-        if icon_button(icon, name, hint, why_not(editor, name), SIDE):
+        # Below, the tooltip would be over the eye and the lock of the first row.
+        if icon_button(icon, name, hint, why_not(editor, name), SIDE, is_above=True):
             run(editor, name)
     imgui.pop_font()
 
