@@ -235,7 +235,8 @@ class EditorState:
         """`document` is the next step."""
         assert self.history is not None
         self.preview = None
-        self.drop_hint()
+        if document is not self.committed:
+            self.drop_hint()
         if not self._is_refused(document):
             self.history.apply(label, document)
 
