@@ -170,7 +170,9 @@ COMMANDS: dict[str, Command] = {
     "unrefine": Command(
         "Remove refinement", "", lambda e: e.refining.remove(), _not_refined
     ),
-    "shadow": Command("Shadow", "", lambda e: e.composing.toggle_shadow(), not_moved),
+    "shadow": Command(
+        "Add or remove shadow", "", lambda e: e.composing.toggle_shadow(), not_moved
+    ),
     "depth": Command(
         "Shadows fall on walls and steps", "", lambda e: e.composing.toggle_depth(),
         _cannot_look, _falls_on_depth,
