@@ -137,21 +137,14 @@ def turned(
 ) -> Placement:
     """`placement` with another `turn`, degrees, about what an artist expects to stay.
 
-    A roll alone leaves the middle of the outline where it is seen. The foot of an object that
-    stands stays where it touches; everything else turns about its centre. `points` (N, 3) world
-    are the object's before the placement, `down` (3,) is the ground's normal. Raises ValueError
-    behind the camera.
+    The foot of an object that stands stays where it touches, but for a roll alone. That, and
+    everything else, turns about its centre. `points` (N, 3) world are the object's before the
+    placement, `down` (3,) is the ground's normal. Raises ValueError behind the camera.
     """
     changed = replace(placement, turn=turn)
-    before, after = placement.matrix(lifted, camera), changed.matrix(lifted, camera)
     both = turn_matrix(*turn) @ turn_matrix(*placement.turn).T
     if both[2, 2] > 1 - SAME:  # it turns about the line of sight
-        seen = [
-            camera.project(points @ motion[:3, :3].T + motion[:3, 3]) for motion in (before, after)
-        ]
-        step = seen[0].mean(0) - seen[1].mean(0)
-        move = placement.move[0] + float(step[0]), placement.move[1] + float(step[1])
-        return replace(changed, move=move)
+        return changed
     return _on_its_foot(placement, changed, points, lifted, camera, down)
 
 
@@ -208,6 +201,24 @@ def spun(placement: Placement, degrees: float, item: EditObject, document: Docum
     matrix = turn_matrix(*placement.turn) @ gimbal.matrix(degrees, 0.0, 0.0)
     points = lifted.world_points(lifted.body.means)
     return turned(placement, turn_of(matrix), points, lifted, camera, gimbal.down)
+
+
+def grown(placement: Placement, scale: float, item: EditObject, document: Document) -> Placement:
+    """`placement` with another `scale`, about the foot of what stands where it is, bent or not.
+
+    What flies grows from its centre, as does what would pass behind the camera.
+    """
+    lifted, camera = item.lifted, document.photo.camera
+    changed = replace(placement, scale=scale)
+    if lifted is None or not lifted.stands or changed == placement:
+        return changed
+    points, down = lifted.world_points(lifted.body.means), gimbal_of(item, document).down
+    try:
+        standing = scaled(placement, scale, points, lifted, camera, down)
+        standing.matrix(lifted, camera)
+    except ValueError:
+        return changed
+    return standing
 
 
 def is_in_place(item: EditObject, document: Document) -> bool:

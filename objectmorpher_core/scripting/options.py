@@ -405,14 +405,16 @@ class EditScript:
         None, _range(0.0, 90.0), (OTHER, PLACING), "DEGREES",
         "how steeply you look down on it: 0 from its side, 90 from above",
     )  # fmt: skip
-    scale: float | None = _option(None, NUMBER, _PLACED, "S", "scale factor")
+    scale: float | None = _option(
+        None, NUMBER, _PLACED, "S", "scale factor, from its foot where it stands"
+    )
     key: tuple[EditScript, ...] = _option(
         (), KEYS, _WHOLE, "POSE",
         "a further pose for --video keys, such as 'turn=-20 handle=X,Y:X2,Y2'",
     )  # fmt: skip
     shadow: str = _option(
         "auto", _names("auto", "none"), (OTHER, PLACING), "auto|none",
-        "auto (default): its shadow in the photo goes along",
+        "auto (default): its shadow in the photo goes along; what is only turned keeps it",
     )  # fmt: skip
     remove: bool = _option(
         False, FLAG, (OTHER, PLACING), None, "take the object away and show what is behind it"

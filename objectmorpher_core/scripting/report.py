@@ -146,8 +146,8 @@ def _of_object(
     trust = trust_in(puppet.posed(item.pose, item.placement))
     return {
         "trust": {
-            "sign": trust.sign, "risk": round(trust.risk, 4),
-            "invented": round(trust.invented, 4), "astray": round(trust.astray, 4),
+            "sign": trust.sign, "invented": round(trust.invented, 4),
+            "astray": round(trust.astray, 4),
         },
         "object": {
             "mask_area_px": int(item.mask.sum()),

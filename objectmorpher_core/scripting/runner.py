@@ -31,7 +31,7 @@ from ..document.model import (
     Placement,
     Prompt,
 )
-from ..document.placement import is_in_place, set_seen_from, spun
+from ..document.placement import grown, is_in_place, set_seen_from, spun
 from ..document.settings import DeformSettings, Hint, Shadow
 from ..document.transparency import continued, with_opacity
 from ..pictures.image import naming, read_mask
@@ -149,7 +149,8 @@ def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
         raise ScriptError(f"object {wanted.duplicate} stays in front and cannot be copied")
     document = edits.duplicate(document, wanted.duplicate - 1)
     item = document.objects[k]
-    script, said, place = wanted.script, wanted.said, item.placement
+    script, said = wanted.script, wanted.said
+    place = grown(item.placement, 1.0, item, document)  # from where its own scale grows it
     if {"handle", "pin"} & said:
         document = edits.reset_pose(document, k)
     asked = _placement(script)
@@ -157,7 +158,7 @@ def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
         asked.move if "move" in said else place.move,
         asked.depth if "move" in said else place.depth,
         asked.turn if "turn" in said else place.turn,
-        asked.scale if "scale" in said else place.scale,
+        asked.scale if "scale" in said else item.placement.scale,
     )
     document = edits.set_visible(_put(document, k, place, script), k, True)
     document = finished(document, k, script, said)
@@ -248,12 +249,8 @@ def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
             if trust.sign != SIGNS[0] and _is_in_photo(splats.means, document):
                 is_moved_only = item.pose is None and not any(item.placement.turn)
                 way = "moved" if is_moved_only else "turned"
-                reason = (
-                    f"the photo does not show {trust.invented:.0%} of what is seen of it now"
-                    if trust.invented > trust.risk / 2
-                    else "how deep its parts lie is not sure"
-                )
-                found.append(f"{item.name} is {way} so far that {SAID[trust.sign]}: {reason}")
+                share = f"the photo does not show {trust.invented:.0%} of what is seen of it now"
+                found.append(f"{item.name} is {way} so far that {SAID[trust.sign]}: {share}")
     return tuple(found)
 
 
@@ -279,12 +276,14 @@ def _placement(script: EditScript) -> Placement:
 
 
 def _put(document: Document, k: int, placement: Placement, script: EditScript) -> Document:
-    """Object `k` at a `placement`, and before that spun as the script says."""
+    """Object `k` at a `placement`, before that spun as the script says, and grown on its foot."""
     if script.seen_from is not None:
         document = set_seen_from(document, k, script.seen_from)
+    item, scale = document.objects[k], placement.scale
+    placement = replace(placement, scale=1.0)
     if script.spin:
-        placement = spun(placement, script.spin, document.objects[k], document)
-    return edits.set_placement(document, k, placement)
+        placement = spun(placement, script.spin, item, document)
+    return edits.set_placement(document, k, grown(placement, scale, item, document))
 
 
 def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript) -> Document:

@@ -67,6 +67,7 @@ def editor(request: pytest.FixtureRequest, shared_editor: Editor, photo_path: Pa
     close_all(shared_editor)
     wait_until(shared_editor, lambda: shared_editor.jobs.is_idle)
     shared_editor.view = ViewState()  # nothing of it stays from the test before
+    shared_editor.filing.wanted = shared_editor.filing.question = None
     shared_editor.view.resize(*CANVAS)
     if "ball" not in request.fixturenames:
         open_file(shared_editor, photo_path)

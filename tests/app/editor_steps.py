@@ -12,7 +12,8 @@ from hands import PATIENCE
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
-from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement, Prompt
 
 WIDTH, HEIGHT = 180, 140  # px of the made photo
 CENTRE = (90.0, 72.0)  # px, of the ball in it
@@ -83,3 +84,9 @@ def duplicate(editor: Editor, document: Document, *move: float) -> None:
     run(editor, "duplicate")
     editor.placing.move_to(Placement(move=(move[0], move[1])))
     editor.commit("Move object")
+
+
+def not_lifted(document: Document) -> Document:
+    """Its first object with the same mask, and nothing that was made of it."""
+    bare = edits.set_mask(document, 0, None, Prompt())
+    return edits.set_mask(bare, 0, document.objects[0].mask, Prompt())

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from editor_steps import not_lifted
 from objectmorpher.cli.options import WindowOptions
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
@@ -31,6 +32,8 @@ SIZE = (560, 1900)  # px: no panel has to be scrolled, and the picture is small
 PANEL = 255.0  # px from the left, from where on it is the panel
 LAYOUT = 3  # frames, in which ImGui lays out
 DRAG = 24.0  # px, to the side
+# As "Grow": a shape that follows the selection takes seconds, so the object has none for these.
+ALIKE = ("Shrink", "Smooth", "Feather", "Fill holes", "Remove islands")
 PATIENCE = 180.0  # s, that the worker may take
 # They leave the document: files, another photo, models that would be fetched.
 LEFT_ALONE = ("…", "Export", "Undo", "Redo", "Menu:", "Tool:", "Pointer", "Photo", "Refine")
@@ -52,16 +55,18 @@ class Flipper:
     def close(self) -> None:
         self._window.close()
 
-    def open(self, unfold: Open) -> None:
+    def open(self, unfold: Open, is_lifted: bool = True) -> None:
         """Begin anew with the document; `unfold` shows the controls."""
         editor = self.editor
         editor.view.popup, editor.filing.wanted, editor.message = None, None, None
-        editor.start(self._document)
+        editor.start(self._document if is_lifted else not_lifted(self._document))
         editor.current, editor.view.compose = 0, ComposeView()
         editor.view.selecting.painted, editor.view.pose.mode = Painted.SELECTION, PoseMode.DRAG
         editor.view.wants_panel = True
         self._hold(2.0, SIZE[1] - 2.0)
         unfold(editor)
+        if not is_lifted:
+            self.settle()  # its background is that of no object now
 
     def settle(self) -> None:
         """Frames until nothing runs."""
@@ -198,7 +203,7 @@ def main() -> None:
 def flipped(flipper: Flipper, unfold: Open, label: str) -> Iterator[dict[str, object]]:
     """A control clicked, and, where that changes nothing, dragged."""
     for gesture in (flipper.click, flipper.drag):
-        flipper.open(unfold)
+        flipper.open(unfold, is_lifted=label not in ALIKE)
         before, place = flipper.editor.committed, flipper.labels().get(label)
         if before is None or place is None:
             return

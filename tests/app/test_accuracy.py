@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 OBJECTS = {"astronaut": (224, 150), "coffee": (300, 215), "chelsea": (200, 150)}  # clicks, px
 ZOOMS = (0.6, 1.7, 6.0)  # canvas px per px of the photo
-POINTS = 20
+POINTS = 8
 FARTHEST = 90.0  # canvas px that a point is dragged
 PIXEL = 1.0  # canvas px
 

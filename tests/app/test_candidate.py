@@ -65,6 +65,25 @@ def test_the_users_own_request_ends_the_search_for_a_candidate(editor: Editor) -
     assert editor.mask is not None
 
 
+def test_a_click_that_another_question_replaced_is_not_made_later(editor: Editor) -> None:
+    """It waited for a candidate's answer; the next candidate's is not its own."""
+    wait_for_jobs(editor)
+    rest_on(editor, *CENTRE)
+    wait_until(editor, lambda: editor.jobs.is_busy(CANDIDATE))
+    editor.selection.add_click(*CENTRE, True)
+    run(editor, "subject")
+    assert editor.selection.pending is not None and editor.selection.pending.is_subject
+    wait_for_jobs(editor)
+    run(editor, "undo")
+    rest_on(editor, 20.0, 20.0)
+    wait_for_jobs(editor)
+    time.sleep(2 * candidate.REST)
+    editor.poll()
+    wait_for_jobs(editor)
+    assert editor.mask is None and editor.message is not None
+    assert not editor.message.is_error
+
+
 def test_nothing_is_asked_while_the_worker_works(editor: Editor) -> None:
     wait_for_jobs(editor)
     editor.selection.add_click(*CENTRE, True)

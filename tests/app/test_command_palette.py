@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hands import opened
-from objectmorpher.commands import COMMANDS, OTHER_WORDS, SETTINGS
+from objectmorpher.commands import COMMANDS, GROUPS, OTHER_WORDS, SETTINGS
 from objectmorpher.editor.editor import Editor
 from objectmorpher.gui.dialogs.popups.palette import CommandPalette
 from objectmorpher.system.help_pages import FIRST, ORDER, Kind, blocks_of, pages
@@ -46,6 +46,16 @@ def test_the_settings_it_names_are_those_of_the_panels() -> None:
         if not re.search(rf'(\bt|\bNumber)\("{re.escape(label)}"', source)
     ]  # fmt: skip
     assert missing == []
+
+
+def test_no_setting_looks_like_a_command(editor: Editor) -> None:
+    """Of the same tool, that is; beside each the palette says which."""
+    found = [(entry.title, entry.group) for entry in CommandPalette()._found(editor)]
+    assert len(set(found)) == len(found)
+    settings = {(title, group.removeprefix("Setting: ")) for title, group in found
+                if group.startswith("Setting: ")}  # fmt: skip
+    assert not settings & {(title, group) for title, group in found if group in GROUPS}
+    assert ("Shadow", "Compose") in settings and ("Symmetry", "Pose") not in settings
 
 
 def test_it_names_every_number_and_every_tick_of_the_panels() -> None:

@@ -11,12 +11,14 @@ import pytest
 from PIL import Image
 
 from editor_steps import CENTRE, lift_ball, open_file, wait_for_jobs
-from objectmorpher.commands import COMMANDS, next_step, run
+from objectmorpher.commands import COMMANDS, next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session
@@ -112,6 +114,65 @@ def test_undo_while_selecting_takes_the_click_back(editor: Editor) -> None:
     wait_for_jobs(editor)
     assert editor.selection.pending is None
     assert editor.mask is None
+
+
+def test_clicks_before_the_first_answer_are_one(editor: Editor) -> None:
+    for _ in range(3):
+        editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    prompt = editor.selection.prompt
+    assert (len(prompt.clicks), prompt.level) == (1, editor.view.selecting.level)
+
+
+@pytest.mark.parametrize("is_late", [False, True])
+@pytest.mark.parametrize("is_subject", [False, True])
+def test_what_is_painted_before_an_answer_comes_is_kept_beside_it(
+    editor: Editor, is_late: bool, is_subject: bool
+) -> None:
+    """`is_late`: the answer comes during the stroke."""
+
+    def ask() -> None:
+        if is_subject:
+            editor.selection.select_subject()
+        else:
+            editor.selection.add_click(*CENTRE, True)
+
+    ask()
+    wait_for_jobs(editor)
+    found = editor.mask
+    run(editor, "undo")
+    ask()
+    editor.view.tool, editor.view.brush = ToolName.MASK, Brush(6.0, 1.0)
+    near, far = editor.view.canvas_from_image(np.array([(20.0, 20.0), (60.0, 20.0)]))
+    press(editor, MaskTool(), near)
+    move(editor, far)
+    if is_late:
+        wait_for_jobs(editor)
+    release(editor, far)
+    painted = editor.mask
+    assert painted is not None and painted[20, 40]
+    wait_for_jobs(editor)
+    assert found is not None and editor.mask is not None
+    np.testing.assert_array_equal(editor.mask, found | painted)
+    assert editor.selection.pending is None and not editor.selection.prompt.is_empty
+    run(editor, "undo")
+    assert editor.mask is painted
+    run(editor, "undo")
+    assert editor.mask is None
+
+
+def test_while_an_object_is_lifted_no_one_is_told_to_lift_it(editor: Editor) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    assert why_not(editor, "pose") == "Lift an object first"
+    run(editor, "lift")
+    for name in ("pose", "forward", "bare", "lift"):
+        assert why_not(editor, name) == "The object is being lifted", name
+    editor.choose_tool(ToolName.PLACE)
+    assert editor.message is not None and editor.message.text == "The object is being lifted"
+    editor.jobs.cancel()
+    wait_for_jobs(editor)
+    assert why_not(editor, "pose") == "Lift an object first"
 
 
 def test_an_answer_to_an_old_question_is_dropped(editor: Editor) -> None:

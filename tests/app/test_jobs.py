@@ -120,6 +120,19 @@ def test_a_spare_request_waits_for_those_that_come_later(worker: Jobs) -> None:
     assert [np.asarray(answer).item() for answer in log.answers[1:]] == [4.0, 2.0]
 
 
+def test_what_waits_for_a_job_that_is_nobodys_is_shown(worker: Jobs) -> None:
+    log = Log()
+    worker.start("Quiet", job_functions.wait, 5.0, done=log.answers.append,
+                 failed=log.errors.append, is_quiet=True, is_spare=True)  # fmt: skip
+    run_until(worker, lambda: worker.current is not None and worker.current.fraction > 0)
+    assert worker.shown is None
+    start(worker, log, job_functions.double, np.ones(3))
+    assert worker.shown is not None and worker.shown.title == "Test"
+    assert worker.current is not worker.shown
+    run_until(worker, lambda: worker.is_idle)
+    assert worker.shown is None
+
+
 def test_a_failure_is_a_sentence(worker: Jobs) -> None:
     log = Log()
     start(worker, log, job_functions.fail)

@@ -327,6 +327,25 @@ def test_the_edited_picture_stays_whatever_tool_and_object(editor: Editor, ball:
     assert {(ToolName.SELECT, False), (ToolName.MASK, True), (ToolName.POSE, True)} <= shown
 
 
+def test_beside_an_object_that_was_moved_what_is_selected_is_veiled_too(
+    editor: Editor, ball: Document
+) -> None:
+    _moved_ball(editor, ball, 40.0, 5.0)
+    editor.objects.start_another()
+    paint(editor, FAR)
+    for tool in (ToolName.MASK, ToolName.SELECT):
+        editor.view.tool = tool
+        scenes = build_scene(editor, "tiles"), build_scene(editor, "gl")
+        veil, again = (scene.layers[-1] for scene in scenes if scene is not None)
+        assert veil.is_tint and veil is again, "nothing to draw anew"
+        rgba, box = veil.rgba, veil.box
+        places = editor.view.canvas_from_image(np.array([FAR, CENTRE, (-5.0, 20.0)]))
+        scale = rgba.shape[1] / (box[2] - box[0])
+        at, beside, outside = (rgba[int(y * scale), int(x * scale)] for x, y in places)
+        assert not at.any() and not outside.any()
+        assert beside[3] > 50 and not beside[:3].any()
+
+
 def _picture(editor: Editor) -> tuple:
     """What the canvas shows, by identity."""
     scene = build_scene(editor, "tiles")

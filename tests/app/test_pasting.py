@@ -221,6 +221,9 @@ def test_in_its_own_photo_it_is_a_copy(editor: Editor, ball: Document) -> None:
     assert editor.document is not None and len(editor.document.objects) == 2
     assert not editor.document.objects[1].is_visitor
     assert editor.document.objects[1].mask is ball.objects[0].mask
+    assert editor.message is not None and "over the original" in editor.message.text
+    run(editor, "backward")
+    assert editor.message is None, "it was said for the step before"
     wait_for_jobs(editor)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import gc
 import random
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,8 +17,10 @@ from objectmorpher.commands import run, why_not
 from objectmorpher.editor.autosave import recovery_root
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
+from objectmorpher.editor.shortcuts import Shortcuts
 from objectmorpher.editor.state import Tab
 from objectmorpher.editor.view import Shown, ToolName
+from objectmorpher.gui.window.input import Input
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session
 
@@ -169,11 +172,26 @@ def test_closing_asks_for_each_tab_and_quitting_once_for_all(tabs: Editor, tmp_p
     run(tabs, "quit")
     assert tabs.filing.asked == (first, second) and not tabs.is_over
     tabs.filing.answer_save()
+    keys = Input(Shortcuts(tabs))
+
+    def press_enter(is_reached: Callable[[], bool]) -> bool:
+        """It is for the dialog that comes, not for the photo between two of them."""
+        if is_reached():
+            return True
+        keys._run_key(tabs, "Enter")
+        assert tabs.exporting.draft is None, "the next step of the photo that is seen"
+        return False
+
     for tab, name in ((first, "a"), (second, "b")):
-        wait_until(tabs, lambda tab=tab: tabs.tab is tab and tabs.filing.wanted is Dialog.SAVE)
+
+        def is_asked(tab: Tab = tab) -> bool:
+            return tabs.tab is tab and tabs.filing.wanted is Dialog.SAVE
+
+        wait_until(tabs, partial(press_enter, is_asked))
         tabs.filing.wanted = None
         tabs.filing.choose(Dialog.SAVE, tmp_path / f"{name}.omorph")
-    wait_until(tabs, lambda: tabs.is_over)
+    wait_until(tabs, lambda: press_enter(lambda: tabs.is_over))
+    assert not tabs.filing.is_asking
     tabs.is_over = False
     for name, x in (("a", 3.0), ("b", 4.0)):
         saved = decode_session((tmp_path / f"{name}.omorph").read_bytes())

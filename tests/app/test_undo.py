@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import pytest
 
-from editor_steps import wait_for_jobs
+from editor_steps import not_lifted, wait_for_jobs
 from hands import PATIENCE, ROOT
 from objectmorpher.commands import COMMANDS, GROUPS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, Placement, Prompt
+from objectmorpher_core.document.model import Document, Placement
 from tests.tree import PYTHONPATH
 
 ELSEWHERE = {  # not about an edit
@@ -29,12 +29,6 @@ CHANGING = {  # commands of which a change is known: nobody may forget to look
     "ground", "duplicate", "remove_object", "forward", "shadow", "decontaminate", "to_front",
 }  # fmt: skip
 ALIKE = {"shrink", "smooth", "feather"}  # as "grow": a shape that follows the mask takes seconds
-
-
-def not_lifted(ball: Document) -> Document:
-    """The ball with the same mask, and nothing that was made of it."""
-    bare = edits.set_mask(ball, 0, None, Prompt())
-    return edits.set_mask(bare, 0, ball.objects[0].mask, Prompt())
 
 
 def worked_on(ball: Document) -> Document:

@@ -14,9 +14,9 @@ pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 
 def test_enter_takes_every_step_and_the_title_counts_what_changed(
-    window_environment: dict[str, str], photo_path: Path
+    without_networks: dict[str, str], photo_path: Path
 ) -> None:
-    with opened(window_environment, photo_path) as hands:
+    with opened(without_networks, photo_path) as hands:
         x, y = screen_xy(*CENTRE)
         hands.xdotool("mousemove", round(x), round(y))
 

@@ -45,6 +45,8 @@ def test_a_small_screen_holds_the_window(compiled: None, ball: Document, tmp_pat
             assert 0 <= x0 <= x1 <= SCREEN[0] and 0 <= y0 <= y1 <= SCREEN[1]
         hands.choose(PANEL)
         hands.area(REMOVE)
+        eye = hands.area("Hide or show the object")
+        hands.wait(lambda: hands.area("Tooltip")[3] <= eye[1], "telling above the eye")
         hands.click(*hands.pointer())
         hands.wait(lambda: REMOVE not in hands.places(), "folding the panel")
         hands.catch_up()

@@ -20,7 +20,7 @@ from tests import shapes
 from tests.tree import quick
 
 NODES = 60
-SESSIONS = 2000
+SESSIONS = 800
 PIXEL = 1 / 500  # diameters: of an object that is 500 px large
 SAME = 0.05 * PIXEL
 MET = 1e-6  # diameters
@@ -109,7 +109,7 @@ def motion(document: Document, deformer: Deformer) -> float:
 
 
 @pytest.mark.parametrize(
-    ("body", "sessions"), quick([(False, 50), (True, 15), (False, SESSIONS), (True, 200)], 2)
+    ("body", "sessions"), quick([(False, 50), (True, 15), (False, SESSIONS), (True, 100)], 2)
 )
 def test_in_random_sessions_nothing_moves_but_what_is_dragged(body: bool, sessions: int):
     random = np.random.default_rng(4)

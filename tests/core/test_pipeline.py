@@ -214,8 +214,11 @@ def test_a_positive_yaw_takes_what_faces_the_camera_to_the_left():
 
 @pytest.mark.parametrize("scale", [0.5, 1.5])
 def test_scale_scales_the_objects_picture(scale):
-    width = np.flatnonzero(_shown(_run(scale=scale)).any(0))
+    shown = _shown(_run(scale=scale))
+    width = np.flatnonzero(shown.any(0))
     assert width[-1] - width[0] + 1 == pytest.approx(90 * scale, rel=0.06)  # perspective
+    foot = np.flatnonzero(MASK.any(1))[-1]
+    assert np.flatnonzero(shown.any(1))[-1] == pytest.approx(foot, abs=2), "it stands on the ground"
 
 
 def test_a_deeper_object_is_smaller():

@@ -29,7 +29,7 @@ from tests.tree import quick
 
 STEP = 2  # every second pixel of the photos
 SETTINGS = LiftSettings(count=4000)
-SUBJECTS = {"chelsea": "cat", "coffee": "coffee", "astronaut": "astronaut"}
+SUBJECTS = {"coffee": "coffee", "chelsea": "cat", "astronaut": "astronaut"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def _posed(name: str) -> Posed:
     return Posed(document, puppet, composite(document, {0: puppet}).pixels)
 
 
-@pytest.fixture(scope="module", params=quick(SUBJECTS, 2))
+@pytest.fixture(scope="module", params=quick(SUBJECTS, 1))
 def posed(request) -> Posed:
     return _posed(request.param)
 
@@ -103,7 +103,7 @@ def _footprint(before: Posed, after: Document, puppet: Puppet) -> np.ndarray:
     return seen
 
 
-@pytest.mark.parametrize("seed", quick(range(4), 1))
+@pytest.mark.parametrize("seed", quick(range(3), 1))
 def test_a_refined_mask_changes_nothing_but_what_it_concerns(posed, seed):
     camera, old = posed.document.photo.camera, posed.document.objects[0]
     base = Base(old.pose, old.handles, np.arange(5))  # which names control points, too

@@ -21,7 +21,7 @@ MASK = shapes.mask("ellipse")
 KEYS = {
     "version": None,
     "photo": {"width", "height"},
-    "trust": {"sign", "risk", "invented", "astray"},
+    "trust": {"sign", "invented", "astray"},
     "object": {"mask_area_px", "gaussians", "edge_gaussians", "control_points", "links",
                "components", "kind"},
     "handles": None,

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import turn_about, turn_matrix, vector_from_matrix
-from objectmorpher_core.document.placement import gimbal_of
+from objectmorpher_core.document.model import EditObject
+from objectmorpher_core.document.placement import foot_of, gimbal_of
 from objectmorpher_core.pipeline import Edited, replay, run_script
 from objectmorpher_core.scripting.options import ScriptError
 from objectmorpher_core.scripting.script import BatchItem, parse_scripts
@@ -92,7 +95,8 @@ def test_an_object_is_the_same_whichever_comes_first(folder):
 
 
 def test_a_copy_has_what_it_is_not_told_from_its_original():
-    edited = _run(_item(turn=[10, 0, 0], scale=0.8, objects=[{"duplicate": 1, "move": [60, 20]}]))
+    copy = {"duplicate": 1, "move": [60, 20]}
+    edited = _run(_item(turn=[10, 0, 0], scale=0.8, floating=True, objects=[copy]))
     _exact(edited)
     own, copy = edited.document.objects
     assert copy.lifted is own.lifted and copy.mask is own.mask
@@ -119,6 +123,30 @@ def test_a_copy_can_be_bent_otherwise():
     told = edited.report()["objects"]
     assert told[0]["handles"] == [] and told[1]["handles"][0]["error_px"] < 1.0
     assert told[1]["energy"]["iterations"] > 0
+
+
+@over("place", [{"move": [9, 4, 0.2]}, {"turn": [20, 0, 8]}, {"spin": 30, "move": [5, 5]}])
+def test_what_is_scaled_stands_where_it_stood_and_what_floats_keeps_its_centre(place):
+    """Wherever it is. A copy has the size that it is told, on the foot of its original."""
+    copies = [{"duplicate": 1, "scale": 0.5}, {"duplicate": 1, "scale": 1}]
+    (large,) = _run(_item(**place)).document.objects
+    edited = _run(_item(scale=0.7, objects=copies, **place))
+    assert [item.placement.scale for item in edited.document.objects] == [0.7, 0.5, 1]
+    foot = _foot(large, edited)
+    for item in edited.document.objects:
+        assert item.lifted is not None and item.lifted.stands
+        np.testing.assert_allclose(_foot(item, edited), foot, atol=1e-9)
+    (large,) = _run(_item(floating=True, **place)).document.objects
+    (small,) = _run(_item(floating=True, scale=0.7, **place)).document.objects
+    assert small.placement == replace(large.placement, scale=0.7)
+
+
+def _foot(item: EditObject, edited: Edited) -> F64:
+    """(3,) world: of what it stands on."""
+    lifted = item.lifted
+    assert lifted is not None
+    points, down = lifted.world_points(lifted.body.means), gimbal_of(item, edited.document).down
+    return foot_of(item.placement, points, lifted, edited.document.photo.camera, down)
 
 
 def test_what_is_removed_shows_what_is_behind_it():

@@ -11,25 +11,23 @@ from .command import Command
 
 # Which settings there are, by the command that brings them into view: for the command palette.
 #
-# English keys of texts, as the panels have them; a test checks that each is one.
+# English keys of texts, as the panels have them; a test checks that each is one. What a command
+# of the same name switches on and off is not among them.
 
 SETTINGS: dict[str, tuple[str, ...]] = {
     "preferences": ("Theme", "Text size", "Language", "Motion", "Screen colours", "File dialogs",
                     "Long jobs"),
-    "select": ("Select by", "Keep in front"),
+    "select": ("Select by",),
     "mask": (
         "Brush", "Radius", "Hardness", "Distance", "Edge", "Decontaminate", "Clean", "Depth",
         "Hidden",
     ),
     "pose": (
-        "Rigidity", "What stays", "Symmetry", "Drag the mirrored point too", "Rotation ring (R)",
-        "Anchors", "Regions", "Influence of the handle", "Strain", "Softness", "Stiffness", "Turn",
-        "X", "Y", "Depth", "Pin: it holds still", "Turns with the object",
+        "Rigidity", "What stays", "Drag the mirrored point too", "Rotation ring (R)", "Anchors",
+        "Regions", "Softness", "Stiffness", "Turn", "X", "Y", "Depth", "Pin: it holds still",
+        "Turns with the object",
     ),
-    "place": (
-        "Move along the ground", "Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "From above",
-        "Scale",
-    ),
+    "place": ("Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "From above", "Scale"),
     "look": (
         "Thickness", "Learned shape", "It stands in the photo", "Use the depth model", "Zoom",
         "Before and after", "Kind", "Other side", "Symmetry",
@@ -170,7 +168,7 @@ def next_step(editor: Editor) -> tuple[str, str | None]:
     """Return the primary button's text and its command (None where it is only a text)."""
     if editor.document is None:
         return t("Open a photo…"), "open"
-    if editor.tasks.is_lifting:
+    if editor.is_lifting:
         return t("Lifting…"), None
     if editor.mask is None:
         is_busy = editor.jobs.is_busy(SELECT)

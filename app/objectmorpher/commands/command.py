@@ -29,13 +29,13 @@ def no_selection(editor: Editor) -> str | None:
 
 
 def no_lift(editor: Editor) -> str | None:
-    return None if editor.is_lifted else no_photo(editor) or t("Lift an object first")
+    return None if editor.is_lifted else no_photo(editor) or editor.why_no_shape
 
 
 def nothing_lifted(editor: Editor) -> str | None:
     document = editor.document
     is_there = document is not None and any(o.lifted for o in document.objects)
-    return None if is_there else no_photo(editor) or t("Lift an object first")
+    return None if is_there else no_photo(editor) or editor.why_no_shape
 
 
 def no_handle(editor: Editor) -> str | None:
@@ -44,7 +44,7 @@ def no_handle(editor: Editor) -> str | None:
 
 
 def cannot_lift(editor: Editor) -> str | None:
-    if editor.tasks.is_lifting:
+    if editor.is_lifting:
         return t("The object is being lifted")
     if editor.jobs.is_busy(SELECT):
         return t("The selection is not ready yet")

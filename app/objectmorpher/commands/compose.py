@@ -73,7 +73,7 @@ def _cannot_fill(editor: Editor) -> str | None:
     if (reason := compose.missing(name)) is not None:
         return sentence(reason)
     if document is not None and document.plate is not None:
-        is_same = not compose.is_random(name) and document.plate.backend == name
+        is_same = document.plate.backend == name and not compose.is_random(name)
         if is_same and document.plate.painted is None:
             return t("This filler gives the same picture every time")
     return nothing_lifted(editor)
@@ -170,7 +170,9 @@ COMMANDS: dict[str, Command] = {
     "unrefine": Command(
         "Remove refinement", "", lambda e: e.refining.remove(), _not_refined
     ),
-    "shadow": Command("Shadow", "", lambda e: e.composing.toggle_shadow(), not_moved),
+    "shadow": Command(
+        "Add or remove shadow", "", lambda e: e.composing.toggle_shadow(), not_moved
+    ),
     "depth": Command(
         "Shadows fall on walls and steps", "", lambda e: e.composing.toggle_depth(),
         _cannot_look, _falls_on_depth,

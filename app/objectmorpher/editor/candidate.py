@@ -188,7 +188,7 @@ class Candidates:
                 if wanted is not None:
                     editor.complain(answer)
             elif wanted is not None:
-                self.answered(wanted, answer, prompt)
+                self._tasks.take_later(lambda: self.answered(wanted, answer, prompt))
             elif self._is_wished() and editor.mask is before:
                 self.shown = Candidate(photo, prompt, answer, before)
                 self._look_closer(self.shown)
@@ -200,8 +200,8 @@ class Candidates:
         editor.jobs.start(
             "Selecting", job_functions.candidate, photo.pixels,
             edits.beside(document, editor.current, prompt), choice_of(editor),
-            done=accept, failed=fail, cancelled=self._drop, kind=CANDIDATE, is_quiet=True,
-            is_spare=True,
+            done=accept, failed=fail, cancelled=self._drop, replaced=self._forget_wanted,
+            kind=CANDIDATE, is_quiet=True, is_spare=True,
         )  # fmt: skip
 
     def _look_closer(self, shown: Candidate) -> None:
@@ -226,9 +226,14 @@ class Candidates:
         self._asked = None
         self._pop_wanted()
 
+    def _forget_wanted(self) -> None:
+        """Something else was asked instead: the next candidate is not its answer."""
+        self._pop_wanted()
+
     def _pop_wanted(self) -> Question | None:
+        """What the user asked meanwhile; it is no question any more, unless a newer one is."""
         wanted, self._wanted = self._wanted, None
-        if wanted is not None:
+        if wanted is not None and wanted is self._tasks.question:
             self._tasks.question = None
         return wanted
 

@@ -106,7 +106,7 @@ class Editor(EditorState):
         """What is called once a frame; each says whether it has changed anything."""
         tasks = self.tasks
         return (
-            self.jobs.poll, self.chores.poll, tasks.rehearse, tasks.ensure_fronts,
+            self.jobs.poll, self.chores.poll, tasks.deliver, tasks.rehearse, tasks.ensure_fronts,
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
             self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
@@ -267,11 +267,10 @@ class Editor(EditorState):
         """Changes the tool; the ones that need a lifted object say so."""
         self.hand.abort(self)
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
-            self.say(t("Lift an object first"))
+            self.say(self.why_no_shape)
             return
-        said = self.message
-        if tool is not self.view.tool and said and not said.is_error and said.action is None:
-            self.message = None  # what it says to do next is of the tool that is left
+        if tool is not self.view.tool:
+            self.drop_hint()
         self.view.tool = tool
         self.hover = Hover()
 

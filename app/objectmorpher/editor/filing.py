@@ -77,6 +77,14 @@ class Filing:
         self.asked: tuple[Tab, ...] = ()  # the tabs with the changes that the question is about
         self.leaving: Callable[[], None] | None = None  # goes on when all files are written
         self._after_save: Callable[[], None] | None = None
+        self._saves_all = False  # as the answer was
+
+    @property
+    def is_asking(self) -> bool:
+        """Whether there is a question or a dialog, or may be one in a moment: keys are for that."""
+        waits = (self.wanted, self.question, self.leaving, self._exporting.draft)
+        is_at_work = bool(self.writing) or not self._editor.chores.is_idle
+        return any(each is not None for each in waits) or (self._saves_all and is_at_work)
 
     def open(self, path: Path) -> None:
         """Opens a photo or a session in a tab, or goes to the tab that shows it already."""
@@ -224,12 +232,14 @@ class Filing:
     def answer_save(self) -> None:
         then, self.question = self.question, None
         if then is not None:
+            self._saves_all = True
             self._save_all(self.asked, then)
 
     def _save_all(self, tabs: tuple[Tab, ...], then: Callable[[], None]) -> None:
         """Saves one after another; where the user does not name a file, the rest is left."""
         left = tuple(tab for tab in tabs if not tab.is_saved)
         if not left:
+            self._saves_all = False
             then()
             return
 
@@ -259,7 +269,7 @@ class Filing:
 
     def cancel_dialog(self) -> None:
         """The user closed a dialog without choosing."""
-        self.wanted = self._after_save = None
+        self.wanted, self._after_save, self._saves_all = None, None, False
 
     def save(self) -> None:
         """Save into the session's own file; ask for one where there is none yet."""
@@ -269,12 +279,12 @@ class Filing:
             self.save_as(self._editor.path)
 
     def save_as(self, path: Path) -> None:
+        then, self._after_save = self._after_save, None
         if path.suffix.lower() != SESSION_ENDING:
             usual, own = SESSION_ENDING, path.suffix
             sentence = t("a session's name ends in {usual}, not {own}", usual=usual, own=own)
             self._editor.complain(sentence)
             return
-        then, self._after_save = self._after_save, None
         self._tasks.save(path, then)
 
     def suggestion(self, dialog: Dialog) -> Path:

@@ -134,7 +134,9 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("PageUp, PageDown", "Farther, nearer · Shift: much · Alt: little"),
     ),
     "Compose": (
-        ("Drag", "Repair the background, or choose what it is filled from"),
-        ("Alt-drag, right drag", "Bring the photo back"),
+        ("Drag on the background alone", "Paint what is to be filled in again"),
+        ("Drag while filling from a spot", "From what it is filled with to where"),
+        ("Drag while painting on the object", "Paint, clone"),
+        ("Alt-drag, right drag", "Bring back what was painted over"),
     ),
 }

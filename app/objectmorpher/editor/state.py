@@ -28,6 +28,7 @@ from ..worker.requests import Chores, JobError
 from .autosave import Autosave
 from .history import History
 from .settings import Settings
+from .tasks import LIFT, READY
 from .view import Action, Hover, StatusMessage, ViewState
 
 # A photo or session that is open: its document and steps, its files, and how it was looked at.
@@ -179,6 +180,16 @@ class EditorState:
         return self.object is not None and self.object.lifted is not None
 
     @property
+    def is_lifting(self) -> bool:
+        """Whether the current object is on its way."""
+        return self.jobs.is_busy(LIFT) or self.chores.is_busy(f"{READY} {self.current}")
+
+    @property
+    def why_no_shape(self) -> str:
+        """What is to be done, or awaited, where an object in 3D is needed and there is none."""
+        return t("The object is being lifted") if self.is_lifting else t("Lift an object first")
+
+    @property
     def photo_size(self) -> tuple[int, int] | None:
         return self.document.photo.size if self.document else None
 
@@ -196,6 +207,12 @@ class EditorState:
 
     def say(self, text: str, action: Action | None = None) -> None:
         self.message = StatusMessage(text, action=action)
+
+    def drop_hint(self) -> None:
+        """Something else is done: what was said to do next goes, an error or an offer stays."""
+        said = self.message
+        if said is not None and not said.is_error and said.action is None:
+            self.message = None
 
     def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
         """An error: one sentence, its first letter a capital."""
@@ -218,6 +235,8 @@ class EditorState:
         """`document` is the next step."""
         assert self.history is not None
         self.preview = None
+        if document is not self.committed:
+            self.drop_hint()
         if not self._is_refused(document):
             self.history.apply(label, document)
 

@@ -123,7 +123,7 @@ class Tabs:
     def _show(self, tab: Tab) -> None:
         editor, left = self._editor, self._editor.tab
         editor.hand.abort(editor)
-        left.selected, left.is_lifting = self._posing.selected, self._tasks.is_lifting
+        left.selected, left.is_lifting = self._posing.selected, self._editor.is_lifting
         left.keep_view(editor.view)
         shapes, document = tab.shapes, left.document
         for other in self.all:

@@ -68,6 +68,7 @@ class Question:
     label: str  # of the step
     k: int
     combine: Combine = Combine.REFINED
+    before: Mask | None = None  # (H, W) what was selected of it then; by its identity
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +90,7 @@ class Tasks:
         self._posing = posing
         self.question: Question | None = None  # asked, not answered yet
         self.lifts: Question | None = None  # whose answer is lifted at once
+        self._late: Callable[[], None] | None = None  # takes an answer that came during a stroke
         self._plate: tuple[Wanted, Plate] | None = None  # of what was wanted
         self._no_plate: Wanted | None = None  # asked or failed for
         # What stays in front, as it was asked for last: its mask, and the answer
@@ -98,7 +100,8 @@ class Tasks:
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.question = self.lifts = self._plate = self._no_plate = self._front = None
+        self.question = self.lifts = self._late = None
+        self._plate = self._no_plate = self._front = None
 
     @property
     def pending(self) -> Prompt | None:
@@ -172,10 +175,10 @@ class Tasks:
         self.question = question
         photo = document.photo
 
-        def accept(found: Found) -> None:
+        def give(found: Found) -> None:
             self.question = None
             current = editor.document
-            if current is not None and current.photo is photo and not editor.hand.is_busy:
+            if current is not None and current.photo is photo:
                 take(question, found)
 
         def fail(error: JobError) -> None:
@@ -186,9 +189,22 @@ class Tasks:
             t("Selecting"), job_functions.segment, photo.pixels,
             edits.beside(document, question.k, question.prompt),
             BackendChoice(editor.settings.backends.segment, document.seed),
-            done=accept, failed=fail,
+            done=lambda found: self.take_later(lambda: give(found)), failed=fail,
             cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
+
+    def take_later(self, take: Callable[[], None]) -> None:
+        """Takes the answer about a selection: at once, or after the stroke in progress."""
+        self._late = take
+        self.deliver()
+
+    def deliver(self) -> bool:
+        """Takes the answer that came during a stroke; once a frame. Whether there was one."""
+        if self._late is None or self._editor.hand.is_busy:
+            return False
+        take, self._late = self._late, None
+        take()
+        return True
 
     def _drop_question(self) -> None:
         self.question = None
@@ -297,13 +313,6 @@ class Tasks:
             title, lambda progress: build_ready_shape(camera, thing),
             kind=f"{READY} {k}", done=accept, failed=editor.complain_of,
         )  # fmt: skip
-
-    @property
-    def is_lifting(self) -> bool:
-        """Whether the current object is on its way."""
-        editor = self._editor
-        is_asked = editor.jobs.is_busy(LIFT)
-        return is_asked or editor.chores.is_busy(f"{READY} {editor.current}")
 
     def _take_lift(self, changed: Document, k: int) -> None:
         editor = self._editor

@@ -81,6 +81,7 @@ class PlaceTool:
             if is_moved:
                 editor.placing.move_to(changed)
         editor.commit(_labels()[part] if is_moved else "")
+        editor.placing.say_why_no_ground()  # a step takes back what was said before it
 
     def _drag_horizon(self, editor: Editor, first: Pointer) -> Stroke:
         start, is_moved = editor.placing.horizon, False

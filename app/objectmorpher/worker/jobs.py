@@ -137,7 +137,8 @@ class Jobs(Executor):
 
     @property
     def shown(self) -> Request | None:
-        return None if self.current is None or self.current.is_quiet else self.current
+        jobs = (self.current, *self._waiting.values())  # what waits for a quiet one is shown, too
+        return next((job for job in jobs if job is not None and not job.is_quiet), None)
 
     def is_busy(self, kind: str) -> bool:
         current = self.current

@@ -92,7 +92,8 @@ class Request:
     number: int = 0
     fraction: float = 0.0
     note: str = ""
-    started: float = 0.0  # s, monotonic
+    asked: float = 0.0  # s, monotonic
+    started: float = 0.0  # s, monotonic; not before it was asked
     stop_asked: float | None = None  # s, monotonic
     ends_at: float = math.inf  # s, monotonic; not stopped by then, its process is ended
 
@@ -135,7 +136,7 @@ class Executor(ABC):
     @property
     @abstractmethod
     def shown(self) -> Request | None:
-        """What runs and is the user's: the status line shows it."""
+        """What runs, or else waits, and is the user's: the status line shows it."""
 
     @property
     @abstractmethod
@@ -166,7 +167,8 @@ class Executor(ABC):
     def _numbered(self, request: Request) -> Request:
         """Answers are matched by their numbers."""
         self._count += 1
-        request.number, request.started = self._count, time.monotonic()
+        request.number, request.asked = self._count, time.monotonic()
+        request.started = request.asked
         return request
 
     def _again(self, request: Request) -> None:

@@ -277,6 +277,17 @@ def test_name_and_format_follow_each_other(moved: Editor, tmp_path: Path) -> Non
     assert exporting.draft.what is What.PHOTO and exporting.path == tmp_path / "x.png"
     exporting.set_name("  ")
     assert exporting.problem == "Type a file name"
+    exporting.choose_what(What.MASK)
+    assert exporting.path.name == "ball-mask.png"
+    exporting.set_name("my ball, 1.5")
+    for what, name in (
+        (What.PHOTO, "my ball, 1.5.png"), (What.VIDEO, "my ball, 1.5"),
+        (What.CUTOUT, "my ball, 1.5.png"),
+    ):  # fmt: skip
+        exporting.choose_what(what)
+        assert exporting.path.name == name, "what was typed stays"
+    exporting.choose_format(Format.WEBP)
+    assert exporting.path.name == "my ball, 1.5.webp"
 
 
 def test_a_file_that_exists_is_replaced_only_after_asking(moved: Editor, tmp_path: Path) -> None:

@@ -85,7 +85,7 @@ def test_bent(splat_pass, zoom, turn, largeness):
     assert gaps.min(0).max() <= PIXEL
 
 
-@pytest.mark.parametrize("seed", quick(range(7), 4))
+@pytest.mark.parametrize("seed", quick(range(4), 2))
 @pytest.mark.parametrize(("splatting", "is_textured"), KINDS)
 def test_gaussians_of_every_kind(splat_pass, splatting, is_textured, seed):
     splats, texture = shapes.random_splats(seed, splatting, is_textured)
@@ -95,7 +95,7 @@ def test_gaussians_of_every_kind(splat_pass, splatting, is_textured, seed):
     assert np.abs(drawn - expected).max() <= PIXEL
 
 
-@pytest.mark.parametrize("seed", quick(range(4), 2))
+@pytest.mark.parametrize("seed", quick(range(4), 1))
 @pytest.mark.parametrize(("splatting", "is_textured"), KINDS)
 def test_gaussians_of_every_kind_from_afar(splat_pass, splatting, is_textured, seed):
     """None of them at the camera, where it would hide the others."""

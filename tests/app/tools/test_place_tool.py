@@ -100,8 +100,10 @@ def test_a_ring_turns_about_its_axis_by_the_angle_along_it(
     found = gimbal.matrix(*placed.placing.angles)
     np.testing.assert_allclose(found, gimbal.matrix(*wanted), atol=np.radians(DEGREES))
     assert placement.scale == START.scale
-    # Its foot, or the middle of its outline, stays: see tests/core/test_ground.py.
+    # Its foot, or its middle, stays: see tests/core/test_ground.py.
     assert placement == placed.placing.turned(START, placement.turn)
+    if part == "roll":
+        assert (placement.move, placement.depth) == (START.move, START.depth)
 
 
 @uprights

@@ -44,6 +44,7 @@ from tests.core.lift.registered import (
 ALONE = LiftSettings(count=4000, uses_depth=False, trust=0)  # of the outline
 
 
+@cache
 def subject() -> LiftSubject:
     one = two_sides()[0]
     return LiftSubject(one.pixels, one.camera, one.mask, cut_out(one.pixels, one.mask))

@@ -193,6 +193,17 @@ def test_trust_falls_with_every_degree(scene):
     assert trust_in(file.posed(None, TURN)).sign == "fine", "it came with its back"
 
 
+@pytest.mark.parametrize("kind", ["free", "round"])
+@pytest.mark.parametrize("doubt", [0.03, 0.3])
+def test_the_sign_is_of_what_the_photo_did_not_show_alone(scene, kind, doubt):
+    """How sure a shape is, and what it was taken for, is the same at turns that look right."""
+    lifted = replace(scene.lifted, kind=kind, doubt=doubt)
+    puppet = Puppet(lifted, DeformSettings(), scene.camera)
+    found = [trust_in(puppet.posed(None, Placement(turn=(a, 0.0, 0.0)))) for a in (30, 45, 90)]
+    assert [trust.sign for trust in found] == ["fine", "look closely", "guesswork"]
+    assert found[0].astray == pytest.approx(doubt * 0.5, rel=0.2)
+
+
 def test_a_side_has_the_colours_of_its_own_part():
     """A small brown head on a red body, of which far more patches are known."""
     y, x = np.mgrid[:260, :240] + 0.5

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32, Mask
+from objectmorpher_core.base.arrays import F32, U8, Mask
 from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
@@ -404,7 +404,7 @@ def stroke_tint(
     return tint(covered[..., None] * np.array(colour, np.float32), covered * 255)
 
 
-def on_canvas(view: ViewState, field: F32, scale: float = 1.0) -> F32:
+def on_canvas(view: ViewState, field: F32 | U8, scale: float = 1.0) -> F32:
     """(h, w) a field as the canvas shows it, of px that are `scale` to one of the photo."""
     size = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
     step = GRAIN / view.zoom * scale  # px of the field per px of the tint

@@ -102,9 +102,9 @@ class Exporting:
         has_plate = bool(is_bare) or (document is not None and document.plate is not None)
         is_lifted = any(item.lifted is not None for item in objects)
         if what is What.DEPTH and not is_lifted:
-            return t("Lift an object first")
+            return editor.why_no_shape
         if what in (What.BACKGROUND, What.LAYERS, What.VIDEO) and not has_plate:
-            return t("The background is not ready yet" if is_lifted else "Lift an object first")
+            return t("The background is not ready yet") if is_lifted else editor.why_no_shape
         return None
 
     def why_no_motion(self, motion: VideoMotion) -> str | None:
@@ -124,13 +124,14 @@ class Exporting:
         return missing_jxl() if format is Format.JXL else None
 
     def choose_what(self, what: What) -> None:
-        self._change(replace(self._draft, what=what), is_named=True)
+        """It has its usual name, unless another one was typed."""
+        draft = self._draft
+        is_usual = draft.name.strip() in ("", self._named(draft).name)
+        changed = self._fitting(replace(draft, what=what))
+        self._change(self._named(changed) if is_usual else _ended(changed))
 
     def choose_format(self, format: Format) -> None:
-        draft = self._draft
-        ending = "" if is_folder(draft.what, format) else format.endings[0]
-        name = _without_ending(draft.name) + ending if Path(draft.name).name else draft.name
-        self._change(replace(draft, format=format, name=name))
+        self._change(_ended(replace(self._draft, format=format)))
 
     def choose_bits(self, bits: int) -> None:
         """8 or 16 a channel; 0 the photo's own."""
@@ -350,10 +351,8 @@ class Exporting:
         assert self.draft is not None, "the dialog is open"
         return self.draft
 
-    def _change(self, draft: Draft, is_named: bool = False) -> None:
-        """`is_named`: the name is to be the usual one of what is exported."""
-        draft = self._fitting(draft)
-        self.draft = self._named(draft) if is_named else draft
+    def _change(self, draft: Draft) -> None:
+        self.draft = self._fitting(draft)
         if self._replacing != self.path:
             self._replacing = None
 
@@ -381,13 +380,12 @@ class Exporting:
         document, current = self._editor.committed, self._editor.current
         objects = () if document is None else document.objects
         is_lifted = current < len(objects) and objects[current].lifted is not None
-        return None if is_lifted else t("Lift an object first")
+        return None if is_lifted else self._editor.why_no_shape
 
     def _named(self, draft: Draft) -> Draft:
         document = self._editor.committed
         stem = Path(document.photo.name).stem if document is not None else "photo"
-        ending = "" if is_folder(draft.what, draft.format) else draft.format.endings[0]
-        return replace(draft, name=f"{stem}-{NAMES[draft.what]}{ending}")
+        return _ended(replace(draft, name=f"{stem}-{NAMES[draft.what]}"))
 
     def _cannot_be_there(self, path: Path) -> str | None:
         """Why nothing can be written to `path`, or None."""
@@ -437,8 +435,13 @@ def _what_of(path: Path) -> What:
     return What.LAYERS if format_of(path.name) in FORMATS[What.LAYERS][:-1] else What.PHOTO
 
 
-def _without_ending(name: str) -> str:
-    """The name without the ending of a format, else without whatever looks like one."""
+def _ended(draft: Draft) -> Draft:
+    """The draft whose name ends as its format's files do, or as folders do."""
+    name = draft.name.strip()
+    if not Path(name).name:
+        return draft
     format = format_of(name)
-    own = [] if format is None else [e for e in format.endings if name.lower().endswith(e)]
-    return name[: -len(own[0])] if own else str(Path(name).with_suffix(""))
+    known = () if format is None else format.endings
+    stem = next((name[: -len(e)] for e in known if name.lower().endswith(e)), name)
+    several = is_folder(draft.what, draft.format)
+    return replace(draft, name=stem + ("" if several else draft.format.endings[0]))

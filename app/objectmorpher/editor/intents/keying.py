@@ -46,7 +46,7 @@ class Keying:
         """Why the pose of now cannot be kept, or None."""
         document = self._editor.committed
         if document is None or all(item.lifted is None for item in document.objects):
-            return t("Lift an object first")
+            return self._editor.why_no_shape
         is_full = self.count >= key_edits.MOST
         return t("There are {count} key poses already", count=self.count) if is_full else None
 

@@ -20,12 +20,15 @@ from objectmorpher_core.document.model import Document, Photo, Prompt
 from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.segment.mask_edit import MaskPainting
 
+from ...canvas.layer import CanvasLayer
+from ...canvas.memo import same
 from ...system.texts import folder_of, t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
 from ..tasks import SELECT, WRITE
 from ..view import Action, ToolName
+from .composing import on_canvas, tint
 
 if TYPE_CHECKING:
     from ..state import EditorState
@@ -53,6 +56,7 @@ class Masking:
         self.painting: MaskPainting | None = None  # the stroke in progress
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
+        self._veil: tuple[tuple[object, ...], CanvasLayer] | None = None  # of what it was made
         self._waiting: list[MaskChange] = []  # the first one is being made
 
     @property
@@ -61,6 +65,21 @@ class Masking:
         if self.painting is not None:
             return self.painting.shown
         return self._editor.object.selection if self._editor.object else None
+
+    def veil_layer(self, share: float) -> CanvasLayer | None:
+        """Return so much black over the canvas beside what is selected, over an edit.
+
+        None where nothing is selected, or the selection's object is seen elsewhere.
+        """
+        item, view = self._editor.object, self._editor.view
+        if item is None or item.selection is None or item.is_moved:
+            return None
+        place = (view.left, view.top, view.zoom, view.width, view.height)
+        key = (item.selection, share, *place)
+        if self._veil is None or not same(self._veil[0], key):
+            alpha = share * on_canvas(view, 255 - mask_edit.as_coverage(item.selection))
+            self._veil = key, tint(np.zeros((*alpha.shape, 3)), alpha)
+        return self._veil[1]
 
     @property
     def is_soft(self) -> bool:
@@ -224,7 +243,8 @@ class Masking:
         editor, document = self._editor, self._editor.document
         if document is None:
             return
-        editor.jobs.cancel(SELECT)
+        if prompt is not None:  # else the answer that comes keeps what was changed meanwhile
+            editor.jobs.cancel(SELECT)
         try:
             changed = self._changed(document, selection, prompt)
         except ValueError as error:

@@ -120,9 +120,14 @@ class Objects:
         self.choose(len(copied.objects) - 1)
         if editor.view.tool is ToolName.SELECT:  # a click would change the outline of both
             editor.view.tool = ToolName.PLACE
-        editor.say(
-            t("{name} lies exactly over the original · Drag it away", name=copied.objects[-1].name)
-        )
+        self.say_copied()
+
+    def say_copied(self) -> None:
+        """Say that the current object is a copy, which nobody sees yet."""
+        if (twin := self._editor.object) is not None:
+            self._editor.say(
+                t("{name} lies exactly over the original · Drag it away", name=twin.name)
+            )
 
     def remove(self) -> None:
         """The current object is not edited any more: the photo shows it as it was."""
@@ -233,7 +238,8 @@ class Objects:
         """Why the current object cannot go so many places to the front, or (negative) back."""
         order = self.order()
         if self._editor.current not in order:
-            return t("Lift an object first, or keep it in front")
+            is_lifting, why = self._editor.is_lifting, self._editor.why_no_shape
+            return why if is_lifting else t("Lift an object first, or keep it in front")
         if len(order) < 2:
             return t("There is no other object")
         place = order.index(self._editor.current)
@@ -359,7 +365,8 @@ class Pasting:
             there = visitor_edits.with_visitor(now, visitor)
             posed = partial(editor.derived.posed, there)
             there = brought_into_sight(there, len(now.objects), posed)
-            self._show(there, visitor.name)
+            self._show(there)
+            editor.say(t("{name} is in this photo now · Drag it to its place", name=visitor.name))
 
         editor.chores.start(
             t("Pasting"), lambda progress: build(), kind=PASTE, done=accept,
@@ -376,14 +383,13 @@ class Pasting:
         """In its own photo it is a copy as of Duplicate; False where the original is gone."""
         for k, item in enumerate(document.objects):
             if item.matte is copied.matte and item.lifted is not None:
-                twin = edits.duplicate(document, k)
-                self._show(twin, twin.objects[-1].name)
+                self._show(edits.duplicate(document, k))
+                self._objects.say_copied()
                 return True
         return False
 
-    def _show(self, changed: Document, name: str) -> None:
+    def _show(self, changed: Document) -> None:
         editor = self._editor
         editor.apply(t("Paste object"), changed)
         self._objects.choose(len(changed.objects) - 1)
         editor.view.tool = ToolName.PLACE
-        editor.say(t("{name} is in this photo now · Drag it to its place", name=name))

@@ -154,7 +154,7 @@ class Painting:
         """The brush is put down; False where there is nothing to paint with, or on."""
         editor, view = self._editor, self._editor.view
         if editor.document is None or not editor.is_lifted or editor.object is None:
-            editor.say(t("Lift an object first"))
+            editor.say(editor.why_no_shape)
             return False
         if editor.object.is_locked:
             editor.say_locked(editor.current)

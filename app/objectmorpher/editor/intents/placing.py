@@ -177,7 +177,7 @@ class Placing:
     def _find_ground(self) -> tuple[Ground | None, str | None]:
         document, thing = self._editor.document, self._editor.object
         if document is None or thing is None or thing.lifted is None:
-            return None, t("Lift an object first")
+            return None, self._editor.why_no_shape
         if (ground := ground_for(document, thing)) is not None:
             return ground, None
         return None, t("The object's lowest point is above the horizon, so it cannot stand")
@@ -196,7 +196,7 @@ class Placing:
         return with_centre(placement, standing, thing.lifted, camera)
 
     def turned(self, start: Placement, turn: tuple[float, float, float]) -> Placement:
-        """`start` with another turn, about the object's foot or the middle of its outline."""
+        """`start` with another turn, about the object's foot or its middle."""
         try:
             changed = turned(start, turn, *self._standing())
         except ValueError:  # behind the camera, as `move_to` will say

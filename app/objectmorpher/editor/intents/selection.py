@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32, Mask
+from objectmorpher_core.base.arrays import F32, Mask, frozen
 from objectmorpher_core.base.arrays import Selection as SelectionMask
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import LEVELS, Click, Document, Plate, Prompt
@@ -103,7 +103,8 @@ class Selection:
         elif before.is_empty and not is_foreground:
             editor.say(t("Click the object first; then right-click what does not belong to it"))
         elif is_foreground and self._is_repeated(before, click):
-            self.set_level(LEVELS[LEVELS.index(before.level) - 1])  # the part first, then the group
+            if question is None:  # else nobody has seen yet what is to be more, or less
+                self.set_level(LEVELS[LEVELS.index(before.level) - 1])  # part first, then group
         else:
             label = _label(Combine.ADDED if is_foreground else Combine.REMOVED)
             level = before.level if before.clicks else editor.view.selecting.level
@@ -121,7 +122,7 @@ class Selection:
         if editor.document is None or editor.photo_size is None:
             return
         inside = mask_edit.enclosed(outline, editor.photo_size)
-        question = Question(Prompt(), t("Draw around"), editor.current, combine)
+        question = Question(Prompt(), t("Draw around"), editor.current, combine, editor.mask)
         if inside.any():
             editor.jobs.cancel(SELECT)
             self._apply(question, inside, editor.document)
@@ -187,6 +188,7 @@ class Selection:
         if k == len(document.objects):
             document = edits.add_object(document)
         try:
+            document = _with_work(document, question)
             changed = _changed(document, question, mask, document.objects[k].selection)
         except ValueError as error:
             editor.complain(str(error))
@@ -197,7 +199,10 @@ class Selection:
 
     def _ask(self, prompt: Prompt, label: str, combine: Combine = Combine.REFINED) -> None:
         editor = self._editor
-        question = Question(prompt, label, editor.current, combine)
+        asked, before = self._tasks.question, editor.mask
+        if asked is not None and self.pending is not None and combine is Combine.REFINED:
+            before = asked.before  # it is in this one
+        question = Question(prompt, label, editor.current, combine, before)
         if not self._candidates.take(question):
             self._tasks.segment(question, self.take)
 
@@ -234,9 +239,24 @@ def _changed(
         return edits.change_mask(document, k, mask_edit.united(base, mask))
     if question.combine is Combine.REMOVED:
         return edits.change_mask(document, k, mask_edit.without(base, mask))
-    if question.combine is Combine.REFINED:
-        return edits.answer_prompt(document, k, mask, question.prompt)
-    return edits.set_mask(document, k, mask, question.prompt)
+    return edits.answer_prompt(document, k, mask, question.prompt)
+
+
+def _with_work(document: Document, question: Question) -> Document:
+    """The document in which the answer keeps what was painted since the question was asked.
+
+    A selection made anew keeps nothing else.
+    """
+    item = document.objects[question.k]
+    is_anew = question.combine is Combine.ANEW
+    if item.mask is None or not (is_anew or question.combine is Combine.REFINED):
+        return document
+    if item.mask is question.before:
+        return document.with_object(question.k, replace(item, found=None)) if is_anew else document
+    if is_anew or item.found is None:
+        before = np.zeros_like(item.mask) if question.before is None else question.before
+        item = replace(item, found=frozen(before))
+    return document.with_object(question.k, item)
 
 
 def _label(combine: Combine) -> str:

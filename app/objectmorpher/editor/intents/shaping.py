@@ -242,7 +242,7 @@ class Shaping:
         """Another photo of the current object; of a file its main subject."""
         editor = self._editor
         if not editor.is_lifted:
-            editor.say(t("Lift an object first"))
+            editor.say(editor.why_no_shape)
         elif (reason := self.why_no_photo) is not None:
             editor.say(reason)
         else:

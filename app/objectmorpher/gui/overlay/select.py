@@ -99,7 +99,7 @@ def _draw_click(canvas: CanvasPainter, at: ImVec2, is_foreground: bool) -> None:
 def draw_mask(canvas: CanvasPainter) -> None:
     """Draw the Mask tool's brush. During a stroke only the veil shows the edge, at once.
 
-    Over an edit, which has no veil, a band shows where the brush went.
+    Over an edit, whose veil waits for the stroke's end, a band shows where the brush went.
     """
     editor = canvas.editor
     masking, edging = editor.masking, editor.edging

@@ -62,7 +62,7 @@ THUMB_SHAPE = 3 / 4  # height of a thumbnail by its width
 
 def draw_compose(editor: Editor) -> None:
     if not editor.is_lifted:
-        note(t("Lift an object first."))
+        note(f"{editor.why_no_shape}.")
         return
     _draw_background(editor)
     rule()

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
+from objectmorpher_core.document.model import Prompt
+
 from ...commands import COMMANDS, keys_of, run, why_not
 from ...editor.editor import Editor
 from ...system.texts import t
@@ -56,8 +58,7 @@ def draw_objects(editor: Editor) -> None:
     shown = editor.objects.listed()
     _draw_title(editor, has_buttons=bool(shown))
     if not shown:
-        is_asked = editor.selection.pending is not None
-        note(t("Looking for what you clicked…") if is_asked else t("Click something in the photo."))
+        note(_search(editor.selection.pending))
     top = imgui.get_cursor_screen_pos()
     for k in shown:
         _draw_object(editor, k)
@@ -68,6 +69,13 @@ def draw_objects(editor: Editor) -> None:
         if button(f"{Icon.PLUS}  {t('Another object')}", Emphasis.QUIET):
             run(editor, "another")
         imgui.pop_style_color()
+
+
+def _search(asked: Prompt | None) -> str:
+    """What is said where nothing is selected yet."""
+    if asked is None:
+        return t("Click something in the photo.")
+    return t("Looking for what you clicked…") if asked.clicks else t("Selecting…")
 
 
 def _draw_title(editor: Editor, has_buttons: bool) -> None:
@@ -85,7 +93,8 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
         imgui.set_cursor_pos_y(top - theme.pt(4))
         keys = keys_of(editor, name)
         hint = t(COMMANDS[name].label) + (f" ({keys})" if keys else "")
-        if icon_button(icon, name, hint, why_not(editor, name), SIDE):
+        # Below, the tooltip would be over the eye and the lock of the first row.
+        if icon_button(icon, name, hint, why_not(editor, name), SIDE, is_above=True):
             run(editor, name)
     imgui.pop_font()
 

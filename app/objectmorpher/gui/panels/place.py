@@ -67,7 +67,7 @@ GROUPS = (
 def draw_place(editor: Editor) -> None:
     placement = editor.placing.placement
     if placement is None:
-        note(t("Lift an object first"))
+        note(f"{editor.why_no_shape}.")
         return
     _draw_ground(editor)
     gap(12)

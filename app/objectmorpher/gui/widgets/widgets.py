@@ -57,6 +57,8 @@ LABEL_WIDTH = 72.0  # points, of the names left of the fields
 NAME_GAP = 4.0  # between a longer name and its field
 GAP = 8.0  # between two that stand side by side
 TIP_GAP = 8.0  # points between a control that the keyboard reached and its tooltip
+TIP_WIDTH = 260.0  # of its text at most
+TIP_PADDING = (10.0, 8.0)
 STEPPER = 24.0  # points, width of a field's - and + buttons
 FILL = -1e-6  # width of what ends where the panel's content ends; with -1 it ends a pixel before
 
@@ -95,20 +97,29 @@ def tooltip(text: str, is_above: bool = False) -> None:
     is_reached = imgui.is_item_focused() and imgui.get_io().nav_visible
     is_shown = is_reached or imgui.is_item_hovered(flags)
     if is_shown and is_above:
-        low = imgui.get_item_rect_min()
-        at = ImVec2(low.x, low.y - theme.pt(TIP_GAP))
-        imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(0.0, 1.0))
+        _place_above(text)
     elif is_reached:
         _place_tooltip()
     if is_shown:
-        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(10, 8))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(*TIP_PADDING))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(RADIUS))
         imgui.begin_tooltip()
-        imgui.push_text_wrap_pos(theme.pt(260))
+        imgui.push_text_wrap_pos(theme.pt(TIP_WIDTH))
         imgui.text_unformatted(text)
         imgui.pop_text_wrap_pos()
+        low, size = imgui.get_window_pos(), imgui.get_window_size()
+        mark_on_canvas("Tooltip", low, ImVec2(low.x + size.x, low.y + size.y))
         imgui.end_tooltip()
         imgui.pop_style_var(2)
+
+
+def _place_above(text: str) -> None:
+    """Above the last item, where there is room for all of it."""
+    low, size = imgui.get_item_rect_min(), imgui.calc_text_size(text, False, theme.pt(TIP_WIDTH))
+    right = imgui.get_io().display_size.x - size.x - 2 * theme.pt(TIP_PADDING[0])
+    bottom = max(low.y - theme.pt(TIP_GAP), size.y + 2 * theme.pt(TIP_PADDING[1]))
+    at = ImVec2(min(low.x, right), bottom)
+    imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(0.0, 1.0))
 
 
 def _place_tooltip() -> None:
@@ -159,9 +170,10 @@ _ROLES = {
 
 
 def icon_button(
-    icon: str, name: str, hint: str, why_not: str | None = None, side: float = FIELD
-) -> bool:
-    """A square button with an icon; `name` is its id, `hint` its tooltip."""
+    icon: str, name: str, hint: str, why_not: str | None = None, side: float = FIELD,
+    is_above: bool = False,
+) -> bool:  # fmt: skip
+    """A square button with an icon; `name` is its id, `hint` its tooltip, see `tooltip`."""
     imgui.push_style_color(imgui.Col_.button, theme.vec("panel", 0.0))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
     imgui.begin_disabled(why_not is not None)
@@ -170,7 +182,7 @@ def icon_button(
     imgui.end_disabled()
     imgui.pop_style_var()
     imgui.pop_style_color()
-    tooltip(hint if why_not is None else f"{hint}\n{why_not}")
+    tooltip(hint if why_not is None else f"{hint}\n{why_not}", is_above)
     return is_pressed
 
 

@@ -314,7 +314,7 @@ class Input:
     def _run_key(self, editor: Editor, keys: str) -> None:
         *held, key = keys.split("+")
         is_step = (key in ARROWS or key in DEPTHS) and tuple(held) in PACES
-        is_free = editor.view.popup is None
+        is_free = editor.view.popup is None and not editor.filing.is_asking
         if keys == "Escape" and editor.view.popup is not None:
             editor.view.popup = None
         elif keys == "Escape":

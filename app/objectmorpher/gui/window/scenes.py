@@ -56,6 +56,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     layers, objects = (*frame.layers, *frame.refined), ()
     if renderer == "gl":
         layers, objects = (), (*splat_objects(document, frame), *frame.refined)
+    if is_selecting and (veil := editor.masking.veil_layer(_veil_of(editor))) is not None:
+        layers = (*layers, veil)
     if is_selecting and (tint := editor.shaping.painted_layer()) is not None:
         layers = (*layers, tint)
     if (tint := editor.painting.painted_layer()) is not None:
@@ -89,15 +91,18 @@ def _selecting(editor: Editor, document: Document) -> Scene:
     """The photo, of which nothing was moved, veiled where it is not selected."""
     selection, painting = editor.masking.shown, editor.masking.painting
     is_veiled = selection is not None and not editor.view.is_before
-    is_painted = editor.view.tool is ToolName.MASK
-    strength = PAINTED_VEIL if is_painted else VEIL
-    tint = editor.shaping.painted_layer() if is_painted else None
+    tint = editor.shaping.painted_layer() if editor.view.tool is ToolName.MASK else None
     return Scene(
         editor.derived.photo(document.photo), theme.rgb("surround"),
         layers=() if tint is None else (tint,),
         mask=selection,
-        touched=tuple(painting.touched) if painting else (), veil=strength if is_veiled else 0.0,
+        touched=tuple(painting.touched) if painting else (),
+        veil=_veil_of(editor) if is_veiled else 0.0,
     )  # fmt: skip
+
+
+def _veil_of(editor: Editor) -> float:
+    return PAINTED_VEIL if editor.view.tool is ToolName.MASK else VEIL
 
 
 def _bare_scene(editor: Editor, document: Document) -> Scene:

@@ -77,7 +77,7 @@ def _shown_job(editor: Editor) -> tuple[Executor, Request] | None:
 def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     """Name, bar, share and Cancel; the left end of what it drew."""
     shown = _shown_job(editor)
-    if shown is None or time.monotonic() - shown[1].started < JOB_DELAY:
+    if shown is None or time.monotonic() - shown[1].asked < JOB_DELAY:
         return right
     executor, job = shown
     side = rect.height - theme.pt(4)

@@ -336,6 +336,7 @@ def test_a_box_is_as_its_outline_says_where_the_network_errs(turn) -> None:
     assert aligned.min() > np.cos(np.radians(6.0))
 
 
+@cache
 def box_body(turn: tuple[float, float, float]) -> tuple[ReliefBody, PlainSolid, Camera]:
     """The body of a box that is recognised, as it is turned."""
     seen, _ = see(box(AT, turn_matrix(*turn).T, np.array([0.22, 0.3, 0.15])))

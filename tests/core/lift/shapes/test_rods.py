@@ -48,8 +48,7 @@ def mug(azimuth: float, side: int) -> Mesh:
     return Mesh(np.concatenate([can.vertices, ring.vertices]), faces, can.axes)
 
 
-@pytest.mark.parametrize("side", [1, -1])
-@pytest.mark.parametrize("degrees", [-30, 0, 30])
+@pytest.mark.parametrize(("degrees", "side"), [(-30, 1), (30, -1), (30, 1), (0, -1)])
 def test_a_handle_lies_where_its_azimuth_says(degrees: int, side: int) -> None:
     """Also where the network that sees depth is far off there."""
     azimuth, views = float(np.radians(degrees)), list[RodView]()
@@ -106,10 +105,10 @@ def handles() -> list[RodSample]:
 
 
 @pytest.fixture(scope="module")
-def few_handles() -> list[RodSample]:
+def handle() -> RodSample:
     if models.path(registry.TOKENS) is None:
         pytest.skip(f"{registry.TOKENS} is not here")
-    return [make_sample(seed) for seed in UNSEEN[:3]]
+    return make_sample(UNSEEN[0])
 
 
 @pytest.mark.slow
@@ -124,13 +123,12 @@ def test_the_network_sees_how_handles_lie(handles: list[RodSample]) -> None:
     assert off[sure].mean() < off.mean()
 
 
-def test_a_mirror_image_lies_the_same_way(few_handles: list[RodSample]) -> None:
-    for one in few_handles:
-        found, mirrored = (
-            rod_look.look(one.rgb[:, ::way], one.mask[:, ::way], one.rod[:, ::way], one.lean)
-            for way in (1, -1)
-        )
-        assert found == mirrored
+def test_a_mirror_image_lies_the_same_way(handle: RodSample) -> None:
+    rgb, mask, rod = handle.rgb, handle.mask, handle.rod
+    found, mirrored = (
+        rod_look.look(rgb[:, ::way], mask[:, ::way], rod[:, ::way], handle.lean) for way in (1, -1)
+    )
+    assert found == mirrored
 
 
 def test_the_weights_are_those_of_the_page() -> None:
