@@ -39,7 +39,7 @@ from .colours import fill_in
 from .quilting import quilted
 from .silhouette import inwardness
 
-AWAY = 35.0  # degrees: sides that this turn shows are textured as they look after it
+AWAY = 40.0  # degrees: sides that this turn shows are textured as they look after it
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
 # Ratio of the cosines then and now, down to which the photo goes on beyond where it is shown, so
 # that both agree where they meet: of a turn by 22 degrees and more.
@@ -417,6 +417,8 @@ def _mirrored(picture: _Picture) -> tuple[F32, F32]:
     border bends.
     """
     inner = cv2.GaussianBlur(picture.is_own.astype(np.float32), (0, 0), EVEN) > 0.5
+    if not inner.any():
+        return picture.colors, np.zeros(inner.shape, np.float32)
     away = cv2.distanceTransform((~inner).astype(np.uint8), cv2.DIST_L2, 5)
     down, across = np.gradient(cv2.GaussianBlur(away, (0, 0), SMOOTH))
     back = -2 * away / np.maximum(np.hypot(across, down), 1e-3)
