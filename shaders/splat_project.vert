@@ -32,6 +32,7 @@ uniform vec2 limits;        // |x / z| and |y / z|, see posed.view_limits
 
 uniform bool has_sides;     // invented pictures; else the attributes above are none
 uniform float look_aside;   // rules.Rules
+uniform float fringe_aside;
 uniform bool is_surface;    // rules.Splatting
 uniform float low_pass;     // its `filter`, a word that GLSL keeps for itself
 uniform bool is_compensated;
@@ -136,13 +137,14 @@ void main() {
     vec3 d1 = nearer * rest_rows[1] - turned.y * rest_rows[2] - (change[1] - side.y * change[2]) / at.z;
     vec3 h0 = photo_focal * d0 * root, h1 = photo_focal * d1 * root;
     float cosine = facing(f, at), turn = cosine - size.w;
-    bool is_aside = has_sides && aside.z > 0.0 && size.w < look_aside * cosine;
+    float least_aside = aside.z < 0.0 ? fringe_aside : look_aside;
+    bool is_aside = has_sides && aside.z != 0.0 && size.w < least_aside * cosine;
     vec2 looks = look.xy;
     if (is_aside) {
         h0 = side0 * root - ratio * g0;
         h1 = side1 * root - ratio * g1;
         looks = aside.xy;
-        zoom = aside.z;
+        zoom = abs(aside.z);
     }
     float own = ratio * extra / det;
     float axx = dot(h0, k0) - own * (syy + extra), axy = dot(h0, k1) + own * sxy;

@@ -26,7 +26,9 @@ class Sides:
     top: int
     at: F32  # (N, 2) px of the photo: what each Gaussian's mean shows
     slopes: F32  # (N, 2, 3) px per world unit at rest
-    zoom: F32  # (N,) px per world unit of the picture; 0: the Gaussian is on none
+    # (N,) px per world unit of the picture; 0: the Gaussian is on none; less than 0: it is of a
+    # soft matte's fringe, and takes what it shows from there sooner.
+    zoom: F32
     real: Mask | None = None  # (N,) whose picture is of a further photo; None: all are invented
 
     def __post_init__(self) -> None:

@@ -110,10 +110,11 @@ def project_textured(s, rest, base, sides, aside, screen, rules, kind):
             across, down = _three(sides, q), _three(sides, q + 3 * LANES)
             sx, sy = sides[q + SIDE_U0 * LANES], sides[q + (SIDE_U0 + 1) * LANES]
             own = sides[q + SIDE_ZOOM * LANES]
-            is_less = rest[r + COSINE * LANES] < rules.look_aside * cosine
-            is_aside = (1.0 if is_less else 0.0) * (1.0 if own > 0.0 else 0.0)
+            least = rules.fringe_aside if own < 0.0 else rules.look_aside
+            is_less = rest[r + COSINE * LANES] < least * cosine
+            is_aside = (1.0 if is_less else 0.0) * (1.0 if own != 0.0 else 0.0)
             upper, lower = _chosen(is_aside, across, upper), _chosen(is_aside, down, lower)
-            (ux, uy, zoom) = _chosen(is_aside, (sx, sy, own), (ux, uy, zoom))
+            (ux, uy, zoom) = _chosen(is_aside, (sx, sy, abs(own)), (ux, uy, zoom))
         c00, c01, c10, c11 = _dot(upper, a), _dot(upper, b), _dot(lower, a), _dot(lower, b)
         axx, axy = c00 * ixx + c01 * ixy, c00 * ixy + c01 * iyy
         ayx, ayy = c10 * ixx + c11 * ixy, c10 * ixy + c11 * iyy

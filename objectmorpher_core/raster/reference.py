@@ -60,10 +60,11 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     aside = np.zeros(len(index), bool)
     if rest.sides is not None:  # where an invented picture shows the surface better
         zoom = rest.sides.zoom[index]
-        aside = (zoom > 0) & (rest.cosines[index] < RULES.look_aside * cosine)
+        least = np.where(zoom < 0, RULES.fringe_aside, RULES.look_aside)
+        aside = (zoom != 0) & (rest.cosines[index] < least * cosine)
         pictures = np.where(aside[:, None, None], rest.side_pictures[index], pictures)
         look = np.where(aside[:, None], rest.sides.at[index], look)
-        zoomed = np.where(aside, zoom, zoomed)
+        zoomed = np.where(aside, np.abs(zoom), zoomed)
     a = pictures @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
     filtered = screen + kind.filter * np.eye(2)
     conic = np.linalg.inv(filtered).astype(np.float64)

@@ -39,7 +39,7 @@ from .colours import fill_in
 from .quilting import quilted
 from .silhouette import inwardness
 
-AWAY = 40.0  # degrees: sides that this turn shows are textured as they look after it
+AWAY = 45.0  # degrees: sides that this turn shows are textured as they look after it
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
 # Ratio of the cosines then and now, down to which the photo goes on beyond where it is shown, so
 # that both agree where they meet: of a turn by 22 degrees and more.
@@ -69,6 +69,8 @@ BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the col
 INWARD = 0.4  # of the matte's fringe, up to which its colours are not the object's
 EVEN, SMOOTH = 3.0, 8.0  # px, over which the border at which the photo is mirrored is evened
 LIKE, UNLIKE = 8.0, 50.0  # px over which its colours are compared; levels by which others are off
+DARK = 24.0  # levels of all channels, in which no light is to be measured
+ALONG = 40  # px from a fringe: what has none has edges, where another face begins
 BENT = 2.5  # of its area, by which it may be larger or smaller
 STRIKING = 40.0  # levels, by which what stands out is unlike its surroundings
 MIX = 2  # px beside a hole that are no texture: they are mixed with it
@@ -86,6 +88,14 @@ class _Shot:
     matte: Matte
     inward: F32  # (h, w) how far inside its fringe a pixel of the matte is
     camera: Camera
+
+    def is_fringe(self, rest: RestSplats) -> Mask:
+        """(N,) which Gaussians reach into the matte's fringe."""
+        texture, depth = rest.lifted.texture, rest.lifted.world_points(rest.means)[:, 2]
+        reach = round(rest.spacing * self.camera.focal / float(np.median(depth)))
+        least = cv2.erode(self.inward, np.ones((2 * reach + 1,) * 2, np.uint8))
+        at = np.asarray(texture.u0 - [self.matte.left, self.matte.top] - 0.5, np.float64)
+        return np.asarray(bilinear(np.asarray(least, np.float32), at) < 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,11 +162,17 @@ class _View:
         is_known &= cv2.remap(matte.alpha, *at_xy, cv2.INTER_LINEAR) > HALF
         across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
         area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
-        is_own = area * (self.camera.focal / photo.focal) ** 2 > CLEAR
-        is_own &= is_known & (cv2.remap(shot.inward, *at_xy, cv2.INTER_LINEAR) > OWN)
-        is_clear = is_own & ~_standing_out(255 * straight, is_own)
+        is_own = is_known & (cv2.remap(shot.inward, *at_xy, cv2.INTER_LINEAR) > OWN)
+        is_odd = _standing_out(255 * straight, is_own)
+        is_clear = is_own & ~is_odd & (area * (self.camera.focal / photo.focal) ** 2 > CLEAR)
         return _Picture(
-            straight.clip(0, 1), picture.alpha > 0.5, is_known, is_own, is_clear, picture.depth
+            straight.clip(0, 1),
+            picture.alpha > 0.5,
+            is_known,
+            is_own,
+            is_odd,
+            is_clear,
+            picture.depth,
         )
 
     def _looks(self, picture: Picture3D, photo: Camera) -> F64:
@@ -167,7 +183,7 @@ class _View:
         xy = (xy - [own.cx, own.cy]) * photo.focal / own.focal + [photo.cx, photo.cy]
         return xy + picture.shift
 
-    def is_aside(self, rest: RestSplats, ratio: float) -> Mask:
+    def is_aside(self, rest: RestSplats, ratio: float | F64) -> Mask:
         """(N,) which Gaussians faced the photo's camera less than `ratio` x this view's."""
         return rest.cosines < ratio * self.cosines
 
@@ -177,8 +193,9 @@ class _Picture:
     colors: F32  # (h, w, 3) straight, in [0, 1]; coarse where nothing is known
     is_object: Mask  # (h, w)
     is_known: Mask  # (h, w)
-    is_own: Mask  # (h, w) of that, what is neither drawn out nor a fringe
-    is_clear: Mask  # (h, w) of that, what may be seen elsewhere, for it does not stand out
+    is_own: Mask  # (h, w) of that, what is no fringe
+    is_odd: Mask  # (h, w) what stands out from its surroundings
+    is_clear: Mask  # (h, w) of what is the object's own, what may be copied: not odd, nor drawn out
     depth: F32  # (h, w) world units
 
 
@@ -220,12 +237,12 @@ def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0
     views = [_View.of(rest, camera, turn) for turn in TURNS]
     best = np.argmax([view.cosines for view in views], axis=0)
     is_side = lifted.is_body & (rest.cosines > FARTHEST)
+    is_fringe = shot.is_fringe(rest)
+    least = np.where(is_fringe, RULES.fringe_aside, RULES.look_aside)
     front = _View.of(rest, camera, (0.0, 0.0, 0.0)).drawn(lit, shot)
     sides: list[_Side] = []
     for k, view in enumerate(views):
-        wanted = (
-            (best == k) & (view.cosines > FACING) & view.is_aside(rest, RULES.look_aside) & is_side
-        )
+        wanted = (best == k) & (view.cosines > FACING) & view.is_aside(rest, least) & is_side
         if wanted.sum() >= 3:
             sides += _layers(k, view, np.flatnonzero(wanted), lit, shot)
     sides = _apart(sides, lifted.world_points(rest.means), APART * rest.spacing)
@@ -236,7 +253,11 @@ def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0
             filled[k] = _filled(sides[k], front, seed + sides[k].number)
 
     in_threads(fill, len(sides), parts=len(sides))
-    return _carried(lifted, sides, filled, (matte.left, matte.box[3] + GAP))
+    carried = _carried(lifted, sides, filled, (matte.left, matte.box[3] + GAP))
+    if carried.sides is None:
+        return carried
+    zoom = np.where(is_fringe, -carried.sides.zoom, carried.sides.zoom)
+    return replace(carried, sides=replace(carried.sides, zoom=zoom))
 
 
 def _apart(sides: list[_Side], places: F64, gap: float) -> list[_Side]:
@@ -426,12 +447,17 @@ def _mirrored(picture: _Picture) -> tuple[F32, F32]:
     x, y = (columns + back * across).astype(np.float32), (rows + back * down).astype(np.float32)
     (x_down, x_across), (y_down, y_across) = np.gradient(x), np.gradient(y)
     area = cv2.GaussianBlur(x_down * y_across - x_across * y_down, (0, 0), EVEN)
-    fits = cv2.remap((inner & picture.is_clear).astype(np.uint8), x, y, cv2.INTER_NEAREST) > 0
+    fits = cv2.remap((inner & ~picture.is_odd).astype(np.uint8), x, y, cv2.INTER_NEAREST) > 0
     fits &= picture.is_object & ~inner & (area > 1 / BENT) & (area < BENT)
+    fringe = (picture.is_known & ~picture.is_own).astype(np.uint8)
+    fits &= cv2.dilate(fringe, np.ones((2 * ALONG + 1,) * 2, np.uint8)) > 0
     levels = 255 * picture.colors
     mirrored = np.asarray(cv2.remap(levels, x, y, cv2.INTER_LINEAR), np.float32)
-    expected = _mean(levels, picture.is_object, LIKE)
-    off = np.linalg.norm(_mean(mirrored, fits, LIKE) - expected, axis=-1)
+    expected, there = _mean(levels, picture.is_object, LIKE), _mean(mirrored, fits, LIKE)
+    light = (expected.sum(-1) + DARK) / (there.sum(-1) + DARK)  # it faces elsewhere
+    light = light.clip(*np.exp([-BRIGHTEST, BRIGHTEST]))[..., None].astype(np.float32)
+    mirrored *= light
+    off = np.linalg.norm(light * there - expected, axis=-1)
     share = (fits * np.exp(-((off / UNLIKE) ** 4))).astype(np.float32)
     return mirrored, np.asarray(cv2.GaussianBlur(share, (0, 0), EVEN) * ~inner, np.float32)
 

@@ -255,7 +255,7 @@ class _SideMaps:
         assert lifted.sides is not None, "the caller checks"
         self._sides: Sides = lifted.sides.select(lifted.is_body)
         self._means = lifted.world_points(lifted.body.means.astype(np.float64))
-        self._carriers = near.best(self._sides.zoom > 0)  # (V,) a Gaussian on a picture, or -1
+        self._carriers = near.best(self._sides.zoom != 0)  # (V,) a Gaussian on a picture, or -1
 
     def has_all(self, triangles: I64) -> Mask:
         """(T,) whose three corners are near Gaussians that are on a picture."""
