@@ -73,6 +73,7 @@ DARK = 24.0  # levels of all channels, in which no light is to be measured
 ALONG = 40  # px from a fringe: what has none has edges, where another face begins
 BENT = 2.5  # of its area, by which it may be larger or smaller
 STRIKING = 40.0  # levels, by which what stands out is unlike its surroundings
+SOFT = 5  # px of the photo: a narrower fringe is an edge
 MIX = 2  # px beside a hole that are no texture: they are mixed with it
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
 BEFORE = 3.0  # x spacing, by which what stands before something is nearer
@@ -93,9 +94,11 @@ class _Shot:
         """(N,) which Gaussians reach into the matte's fringe."""
         texture, depth = rest.lifted.texture, rest.lifted.world_points(rest.means)[:, 2]
         reach = round(rest.spacing * self.camera.focal / float(np.median(depth)))
-        least = cv2.erode(self.inward, np.ones((2 * reach + 1,) * 2, np.uint8))
+        fringe = ((self.inward < 1) & (self.matte.alpha > HALF)).astype(np.uint8)
+        fringe = cv2.morphologyEx(fringe, cv2.MORPH_OPEN, np.ones((SOFT, SOFT), np.uint8))
+        near = cv2.dilate(fringe, np.ones((2 * reach + 1,) * 2, np.uint8)).astype(np.float32)
         at = np.asarray(texture.u0 - [self.matte.left, self.matte.top] - 0.5, np.float64)
-        return np.asarray(bilinear(np.asarray(least, np.float32), at) < 1)
+        return np.asarray(bilinear(near, at) > HALF)
 
 
 @dataclass(frozen=True, eq=False)
