@@ -138,7 +138,7 @@ class _View:
         """How long something of this length, world units, is in the picture, about."""
         return length * self.camera.focal / float(np.median(self.places[:, 2]))
 
-    def drawn(self, rest: RestSplats, shot: _Shot) -> _Picture:
+    def drawn(self, rest: RestSplats, shot: _Shot) -> SidePicture:
         """What the photo shows of this view; `rest` has the colours of what it does not.
 
         The outline is the surface's own, and the photo is not faded where it is drawn out.
@@ -166,9 +166,9 @@ class _View:
         across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
         area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
         is_own = is_known & (cv2.remap(shot.inward, *at_xy, cv2.INTER_LINEAR) > OWN)
-        is_odd = _standing_out(255 * straight, is_own)
+        is_odd = standing_out(np.asarray(255 * straight, np.float32), is_own)
         is_clear = is_own & ~is_odd & (area * (self.camera.focal / photo.focal) ** 2 > CLEAR)
-        return _Picture(
+        return SidePicture(
             straight.clip(0, 1),
             picture.alpha > 0.5,
             is_known,
@@ -192,7 +192,9 @@ class _View:
 
 
 @dataclass(frozen=True, eq=False)
-class _Picture:
+class SidePicture:
+    """What the photo shows of an object that is turned to a side."""
+
     colors: F32  # (h, w, 3) straight, in [0, 1]; coarse where nothing is known
     is_object: Mask  # (h, w)
     is_known: Mask  # (h, w)
@@ -209,10 +211,10 @@ class _Side:
     number: int  # of the picture, for its seed: it does not depend on which others there are
     view: _View
     index: np.ndarray  # (n,) of the Gaussians
-    picture: _Picture
+    picture: SidePicture
     is_wanted: Mask  # (h, w) where they are
 
-    def beside(self, front: _Picture) -> _Side:
+    def beside(self, front: SidePicture) -> _Side:
         """The same with what the photo shows to its right: there is the texture unforeshortened."""
         own = self.picture
         height, width = max(len(own.depth), len(front.depth)), front.depth.shape[1]
@@ -226,7 +228,7 @@ class _Side:
             ]
             return np.concatenate(padded, axis=1)
 
-        picture = _Picture(*(joined(f.name) for f in fields(_Picture)))
+        picture = SidePicture(*(joined(f.name) for f in fields(SidePicture)))
         return replace(
             self, picture=picture, is_wanted=np.pad(self.is_wanted, ((0, below[0]), (0, width)))
         )
@@ -350,7 +352,9 @@ def _layers(
     return sides
 
 
-def _side(number: int, view: _View, wanted: np.ndarray, picture: _Picture, spacing: float) -> _Side:
+def _side(
+    number: int, view: _View, wanted: np.ndarray, picture: SidePicture, spacing: float
+) -> _Side:
     """What the picture of a view shows of the `wanted` Gaussians, `spacing` apart."""
     xy = view.xy[wanted]
     is_seen = _is_seen(xy, view.places[wanted, 2], picture, spacing)
@@ -362,7 +366,7 @@ def _side(number: int, view: _View, wanted: np.ndarray, picture: _Picture, spaci
     return _Side(number, view, wanted, picture, away < view.px(2 * spacing) + EDGE)
 
 
-def _is_seen(xy: F64, depth: F64, picture: _Picture, spacing: float) -> Mask:
+def _is_seen(xy: F64, depth: F64, picture: SidePicture, spacing: float) -> Mask:
     """(n,) which places of a view, at px (n, 2), nothing stands before."""
     height, width = picture.depth.shape
     column, row = np.floor(xy).astype(int).T
@@ -379,7 +383,7 @@ def side_by_side(pictures: list[U8]) -> U8:
     return np.concatenate(padded, axis=1)
 
 
-def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
+def _filled(side: _Side, front: SidePicture, seed: int) -> U8 | None:
     """(h, w, 3) the view of a side with what was not known of it where it is wanted.
 
     From what it shows, and from the photo's own view. None where nothing is to be filled, or
@@ -428,17 +432,17 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     clear = cv2.erode(clear, np.ones((2 * MIX + 1,) * 2, np.uint8)) > 0
     heights = np.asarray(cv2.resize(tone[..., -1], hole.shape[::-1]) / HEIGHT, np.float32)
     filled = quilted(filled, known, clear, hole, heights, seed)[: len(side.is_wanted), :width]
-    mirrored, share = _mirrored(side.picture)
-    filled = np.rint(filled + share[..., None] * (mirrored - filled))
+    image, share = mirrored(side.picture)
+    filled = np.rint(filled + share[..., None] * (image - filled))
     return np.asarray(filled.clip(0, 255), np.uint8)
 
 
-def _mirrored(picture: _Picture) -> tuple[F32, F32]:
-    """What is clear of a picture (h, w, 3), mirrored at its border; and (h, w) how well it fits.
+def mirrored(picture: SidePicture) -> tuple[F32, F32]:
+    """What is the object's own (h, w, 3), levels, mirrored at its border; (h, w) how well it fits.
 
-    So hair, peel and cloth go on as they are where they end. What stands out, an eye or a nose, is
-    not there twice. Colours unlike those that are expected do not fit, either, nor what a curved
-    border bends.
+    So hair goes on as it is where the photo's ends; where the photo has no soft fringe there are
+    edges, and other faces behind them. What stands out, an eye or a nose, is not there twice, and
+    neither colours unlike those that are expected fit nor what a curved border bends.
     """
     inner = cv2.GaussianBlur(picture.is_own.astype(np.float32), (0, 0), EVEN) > 0.5
     if not inner.any():
@@ -455,17 +459,17 @@ def _mirrored(picture: _Picture) -> tuple[F32, F32]:
     fringe = (picture.is_known & ~picture.is_own).astype(np.uint8)
     fits &= cv2.dilate(fringe, np.ones((2 * ALONG + 1,) * 2, np.uint8)) > 0
     levels = 255 * picture.colors
-    mirrored = np.asarray(cv2.remap(levels, x, y, cv2.INTER_LINEAR), np.float32)
-    expected, there = _mean(levels, picture.is_object, LIKE), _mean(mirrored, fits, LIKE)
+    image = np.asarray(cv2.remap(levels, x, y, cv2.INTER_LINEAR), np.float32)
+    expected, there = _mean(levels, picture.is_object, LIKE), _mean(image, fits, LIKE)
     light = (expected.sum(-1) + DARK) / (there.sum(-1) + DARK)  # it faces elsewhere
     light = light.clip(*np.exp([-BRIGHTEST, BRIGHTEST]))[..., None].astype(np.float32)
-    mirrored *= light
+    image *= light
     off = np.linalg.norm(light * there - expected, axis=-1)
     share = (fits * np.exp(-((off / UNLIKE) ** 4))).astype(np.float32)
-    return mirrored, np.asarray(cv2.GaussianBlur(share, (0, 0), EVEN) * ~inner, np.float32)
+    return image, np.asarray(cv2.GaussianBlur(share, (0, 0), EVEN) * ~inner, np.float32)
 
 
-def _standing_out(levels: F32, where: Mask) -> Mask:
+def standing_out(levels: F32, where: Mask) -> Mask:
     """(h, w) what is small and unlike its surroundings, of `levels` (h, w, 3) `where` (h, w)."""
     size = where.shape[1] // 4 + 1, where.shape[0] // 4 + 1  # fine enough, and fast
     share = cv2.resize(where.astype(np.float32), size, interpolation=cv2.INTER_AREA)
@@ -487,7 +491,7 @@ def _mean(levels: F32, where: Mask, sigma: float) -> F32:
     )
 
 
-def _heights(side: _Side, front: _Picture, size: tuple[int, int]) -> F32:
+def _heights(side: _Side, front: SidePicture, size: tuple[int, int]) -> F32:
     """(h, w) how far along the axis of its turn what a side and the photo's view show lies.
 
     In levels. A part of an object goes on around it, and not higher or lower.

@@ -13,6 +13,7 @@ import pytest
 
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import reference
+from objectmorpher_core.raster.posed import RestSplats
 from tests import shapes
 from tests.app.render.pictures import bent, pixels_of, premultiplied, rendered, specified
 from tests.tree import quick
@@ -60,6 +61,16 @@ def test_placed(splat_pass, placement):
     drawn = rendered(splat_pass, splats, scene.texture, camera, camera)
     expected = premultiplied(shapes.specified(scene, placement, camera))
     assert np.abs(drawn - expected).max() <= PIXEL
+
+
+def test_a_soft_fringe_turns_aside_as_in_the_specification(splat_pass):
+    scene = shapes.scene("star", 800)
+    sides = scene.lifted.sides
+    assert sides is not None and (sides.zoom != 0).any()
+    fringed = replace(scene.lifted, sides=replace(sides, zoom=-np.abs(sides.zoom)))
+    splats = scene.puppet.posed(None, Placement(turn=(20.0, 10.0, 0.0)))
+    splats = replace(splats, rest=RestSplats(fringed, scene.camera))
+    assert difference(splat_pass, splats, scene.texture, scene.camera, scene.camera) <= PIXEL
 
 
 @pytest.mark.parametrize(("largeness", "turn"), quick(

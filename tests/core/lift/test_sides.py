@@ -13,7 +13,7 @@ from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import LiftedObject, Placement
 from objectmorpher_core.document.settings import DeformSettings
-from objectmorpher_core.lift.relief.sides import with_sides
+from objectmorpher_core.lift.relief.sides import SidePicture, mirrored, standing_out, with_sides
 from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.posed import RestSplats
@@ -146,6 +146,59 @@ def test_beside_turned_fur_stands_hardly_any_ground(yaw):
     red, *others = np.moveaxis(picture.color, -1, 0)  # fur is red before all, neither ground is
     is_ground = np.maximum(*others) > red
     assert picture.alpha[is_ground].sum() < 0.1 * picture.alpha.sum()
+
+
+def test_a_fringe_shows_its_side_sooner(scene):
+    plain = replace(scene.lifted, sides=None)
+    sides = scene.lifted.sides
+    assert sides is not None
+    fringed = replace(scene.lifted, sides=replace(sides, zoom=-np.abs(sides.zoom)))
+    place = Placement(turn=(20.0, 0.0, 0.0))
+    usual, sooner = (_drawn(scene, lifted, place) for lifted in (scene.lifted, fringed))
+    assert sooner.from_photo.sum() < usual.from_photo.sum() - 30
+    splats = scene.puppet.posed(None, place)
+    splats = replace(splats, rest=RestSplats(fringed, scene.camera))
+    slow = reference.render(splats, scene.texture, scene.camera, scene.camera)
+    fast = tiles.render(splats, scene.texture, scene.camera, scene.camera)
+    assert np.abs(slow.color - fast.color).max() < LEVEL
+    rest = [_drawn(scene, lifted, Placement()) for lifted in (plain, fringed)]
+    np.testing.assert_array_equal(rest[0].from_photo, rest[1].from_photo)
+
+
+def _half_seen(colors: np.ndarray, fringe: int) -> SidePicture:
+    """A side (h, w, 3) of which the left half is seen, up to a `fringe` px wide."""
+    seen = np.zeros(colors.shape[:2], bool)
+    seen[:, : seen.shape[1] // 2] = True
+    own = seen.copy()
+    own[:, seen.shape[1] // 2 - fringe :] = False
+    return SidePicture(
+        colors.astype(np.float32), np.ones_like(seen), seen, own, np.zeros_like(seen), own,
+        np.ones(seen.shape, np.float32),
+    )  # fmt: skip
+
+
+def test_hair_is_mirrored_where_the_photo_ends_and_an_edge_is_not():
+    rng = np.random.default_rng(0)
+    hair = cv2.GaussianBlur(rng.random((120, 200, 3)), (0, 0), 2.0)
+    soft, hard = _half_seen(hair, 6), _half_seen(hair, 0)
+    made, share = mirrored(soft)
+    beyond = slice(100, 130)
+    assert share[20:-20, beyond].min() > 0.5
+    image = 255 * hair[:, 2 * 94 - 1 - np.arange(100, 130)]
+    light = made[:, beyond].mean() / image.mean()
+    assert np.abs(made[20:-20, beyond] - light * image[20:-20]).mean() < 4
+    assert mirrored(hard)[1].max() == 0
+
+
+def test_what_stands_out_is_not_there_twice():
+    yellow = np.full((160, 240, 3), 0.5)
+    cv2.circle(yellow, (96, 80), 9, (1.0, 0.9, 0.1), -1)
+    picture = _half_seen(yellow, 6)
+    odd = standing_out((255 * yellow).astype(np.float32), picture.is_own)
+    assert odd[80, 96] and odd.mean() < 0.1
+    made, share = mirrored(replace(picture, is_odd=odd))
+    shown = np.where(share[..., None] > 0.5, made, 127.5)
+    assert np.ptp(shown[:, 120:], axis=-1).max() < 40  # nothing yellow
 
 
 def test_at_rest_nothing_of_it_is_seen(scene):
