@@ -18,6 +18,7 @@ from ..canvas.shape import Shapes
 from ..system.freed_memory import give_back
 from ..system.texts import t
 from ..worker.jobs import RELUCTANCE
+from ..worker.requests import READY
 from .candidate import Candidates, CloserLook
 from .filing import OPEN, Dialog, Filing, SampleOpening
 from .history import History
@@ -46,7 +47,7 @@ from .refits import Refits
 from .settings import Settings
 from .state import EditorState
 from .tabs import Tabs
-from .tasks import READY, SELECT, WRITE, Tasks
+from .tasks import SELECT, WRITE, Tasks
 from .view import USUAL_LEVEL, Hover, Shown, ToolName
 
 

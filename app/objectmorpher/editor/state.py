@@ -24,11 +24,10 @@ from ..system.texts import sentence, t
 from ..tools.pointer import Hand, Pointer
 from ..worker.job_functions import WARM
 from ..worker.jobs import Jobs
-from ..worker.requests import Chores, JobError
+from ..worker.requests import LIFT, READY, Chores, JobError
 from .autosave import Autosave
 from .history import History
 from .settings import Settings
-from .tasks import LIFT, READY
 from .view import Action, Hover, StatusMessage, ViewState
 
 # A photo or session that is open: its document and steps, its files, and how it was looked at.

@@ -33,7 +33,7 @@ from ..canvas.shape import CanvasShape, build_ready_shape, rehearse
 from ..system.texts import folder_of, t
 from ..worker import job_functions
 from ..worker.job_functions import BackendChoice, Cut
-from ..worker.requests import JobError
+from ..worker.requests import LIFT, READY, JobError
 from .view import Action, SelectMode, ToolName
 
 if TYPE_CHECKING:
@@ -43,9 +43,8 @@ if TYPE_CHECKING:
     from .intents.posing import Posing
     from .state import EditorState
 
-REHEARSE, READY = "rehearse", "ready"  # kinds of what runs in a thread
-READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
-FRONT = "front"
+REHEARSE, FRONT = "rehearse", "front"  # kinds of what runs in a thread, beside READY
+READ, SELECT, PLATE, WRITE = "read", "segment", "plate", "write"  # kinds of jobs, beside LIFT
 
 
 Wanted = tuple[Mask | Hint | None, ...]  # what a background depends on: masks, then hints

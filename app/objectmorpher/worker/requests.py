@@ -24,6 +24,7 @@ from objectmorpher_core.base.progress import Cancelled
 
 log = logging.getLogger(__name__)
 
+LIFT, READY = "lift", "ready"  # kinds: a job lifts an object, a thread makes it ready to bend
 OURS = ("objectmorpher", "objectmorpher_core")  # packages
 # What the system says of a wrong request: no other try makes it right.
 LASTING = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG, errno.EINVAL)

@@ -17,7 +17,8 @@ from objectmorpher_core.document.model import Document, EditObject, Photo, Place
 from ...canvas.layer import is_front
 from ...canvas.shape import CanvasShape, build_shape, rehearse
 from ...system.texts import t
-from ..tasks import LIFT, SELECT
+from ...worker.requests import LIFT
+from ..tasks import SELECT
 from ..view import USUAL_LEVEL, Action, ToolName
 from .composing import USUAL_SHADOW
 
