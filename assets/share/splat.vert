@@ -64,7 +64,7 @@ float ramp(float value, float zero, float one) {
 
 float facing(float cosine) {
     float front = is_surface ? clamp((cosine - 0.25 * (1.0 - seen.x)) / 0.25 + 1.0, 0.0, 1.0) : 1.0;
-    float rim = is_edged ? ramp(abs(cosine), 0.5, 0.3) : ramp(abs(cosine), 0.42, 0.22);
+    float rim = is_edged ? ramp(abs(cosine), 0.8, 0.5) : ramp(abs(cosine), 0.42, 0.22);
     return seen.y * front + (1.0 - seen.y) * rim;
 }
 

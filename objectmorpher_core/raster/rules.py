@@ -81,8 +81,8 @@ class Rules(NamedTuple):
     brim_start: float = 0.22
     brim_end: float = 0.42
     # Of edged shapes it goes on over what turns into view, and fades when it is seen edge-on.
-    edged_start: float = 0.3
-    edged_end: float = 0.5
+    edged_start: float = 0.5
+    edged_end: float = 0.8
 
     # Where the motion magnifies the photo, the matte's edge would become a translucent band:
     # below matte_start the surface's own edge takes over from the matte's, wholly at matte_end.
