@@ -59,7 +59,7 @@ def colouring(
     xy = (cells + 0.5) * step + corner
     depth = _depth(silhouette, xy)
     front = _continued(_resized(canvas.foreground, size), shown, depth, xy, axis)
-    front = _without_fringe(front, _resized(inwardness(canvas.whole), size))
+    front = _without_fringe(front, _resized(inwardness(canvas.whole, canvas.foreground), size))
     spacing = spacing / float(step.mean())
     blurred = _blurred(front, BLUR * spacing)
     if is_mirrored:

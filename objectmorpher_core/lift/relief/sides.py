@@ -237,7 +237,7 @@ class _Side:
 def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
     """`lifted` with pictures of what the photo's `camera` does not see of it."""
     rest = RestSplats(replace(lifted, sides=None), camera)
-    shot = _Shot(matte, inwardness(matte.alpha), camera)
+    shot = _Shot(matte, inwardness(matte.alpha, matte.foreground), camera)
     lit = _lit(rest, shot)
     views = [_View.of(rest, camera, turn) for turn in TURNS]
     best = np.argmax([view.cosines for view in views], axis=0)

@@ -223,16 +223,18 @@ MIXED = 0.03, 0.97  # alpha of what is soft
 CRISP = (
     1.0  # px of that, across an edge as crisp as any: of drawn solids 0.7 to 1, of photos 4 to 8
 )
-DEEP = 2.5  # x what is soft beyond that: light from behind reaches farther in than softness does
+DEEP = 2.5  # x what is soft beyond that
+LIT, LIGHTER = 8.0, 1.05  # x that, as light from behind reaches farther in; x what lies inside it
 AROUND = 0.03  # x the root of the area, along the outline: what is as wide
 MOST = 0.08  # x the root of the area
 OF_RADIUS, THIN = 0.35, 2.0  # x the radius of a limb, at most; px, of what is as thin as a hair
 
 
-def inwardness(alpha: F32) -> F32:
+def inwardness(alpha: F32, colors: F32) -> F32:
     """(h, w) how far a pixel of a matte `alpha` (h, w) is inside its fringe: 0 at the outline.
 
-    From 1 on it shows the object's own colours.
+    From 1 on it shows the object's own `colors` (h, w, 3). A fringe that is lighter than what lies
+    inside it is lit from behind, and deeper; a dark one is the object's own.
     """
     scale = min(1.0, LONGEST / max(alpha.shape))
     size = max(1, round(alpha.shape[1] * scale)), max(1, round(alpha.shape[0] * scale))
@@ -248,8 +250,13 @@ def inwardness(alpha: F32) -> F32:
         cv2.GaussianBlur(part, (0, 0), AROUND * root)
         for part in (soft, 0.5 * edge.astype(np.float32))  # both sides of an edge are in it
     )
-    deep = np.clip(DEEP * (area / np.maximum(length, 1e-3) - CRISP), 1e-3, MOST * root)
-    deep = np.minimum(deep, np.maximum(OF_RADIUS * largest_disc(away), THIN))
+    softness = area / np.maximum(length, 1e-3) - CRISP
+    most = np.minimum(np.maximum(OF_RADIUS * largest_disc(away), THIN), MOST * root)
+    lit = np.clip(LIT * softness, 1e-3, most)
+    light = cv2.resize(colors.mean(-1), size, interpolation=cv2.INTER_AREA)
+    fringe, inner = (away > DEEP / LIT * lit) & (away < lit), (away > lit) & (away < 2 * lit)
+    is_lit = fringe.any() and inner.any() and light[fringe].mean() > LIGHTER * light[inner].mean()
+    deep = lit if is_lit else np.clip(DEEP * softness, 1e-3, most)
     inward = (away / deep).clip(0, 1).astype(np.float32)
     return np.asarray(cv2.resize(inward, alpha.shape[::-1]), np.float32)
 

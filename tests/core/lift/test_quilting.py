@@ -109,12 +109,29 @@ def _disc(softness: float, radius: float = 80.0) -> F32:
     return np.clip(inward, 0, 1).astype(np.float32)
 
 
+def _inward(alpha: F32) -> F32:
+    """Of an object of one colour."""
+    return inwardness(alpha, np.full((*alpha.shape, 3), 0.5, np.float32))
+
+
+def test_a_fringe_that_is_lit_from_behind_is_deeper_than_a_dark_one():
+    alpha = _disc(3.0)
+    away = cv2.distanceTransform((alpha > 0.5).astype(np.uint8), cv2.DIST_L2, 5)
+    rim = np.clip(1 - away / 14, 0, 1)[..., None] * np.ones(3, np.float32)
+    own, lit, dark = (
+        (inwardness(alpha, (0.5 + change * rim).astype(np.float32)) < 1)[alpha > 0.5].sum()
+        for change in (0.0, 0.4, -0.4)
+    )
+    assert lit > 1.5 * own
+    assert dark == own
+
+
 def test_the_fringe_is_as_wide_as_the_edge_is_soft():
     """A crisp edge has none; a wider one a wider one; amid a limb nothing is fringe."""
     wide = []
     for softness in (0.0, 1.0, 2.0, 3.0):
         alpha = _disc(softness)
-        inward = inwardness(alpha)
+        inward = _inward(alpha)
         assert inward.shape == alpha.shape and inward.min() >= 0 and inward.max() <= 1
         wide.append(int(((inward < 1) & (alpha > 0.5)).sum()) / (2 * np.pi * 80))
         assert (inward[alpha == 0] < 1).all()
@@ -125,11 +142,11 @@ def test_the_fringe_is_as_wide_as_the_edge_is_soft():
 
 
 def test_the_size_of_a_photo_does_not_change_its_fringe():
-    small = inwardness(_disc(6.0))
-    large = inwardness(cv2.resize(_disc(6.0), None, fx=3, fy=3, interpolation=cv2.INTER_LINEAR))
+    small = _inward(_disc(6.0))
+    large = _inward(cv2.resize(_disc(6.0), None, fx=3, fy=3, interpolation=cv2.INTER_LINEAR))
     again = cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
     assert np.abs(again - small).mean() < 0.02
 
 
 def test_nothing_has_no_fringe():
-    assert (inwardness(np.zeros((30, 40), np.float32)) == 1).all()
+    assert (_inward(np.zeros((30, 40), np.float32)) == 1).all()
