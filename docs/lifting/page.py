@@ -171,15 +171,15 @@ solids, whose edges are crisp, lose 0.03 dB of a turn by 20 degrees and nothing 
 To change from the photo to the invented picture earlier, at a ratio of 0.55 instead of 0.4, lets an
 eye come twice. Quilts alone, without the completion beneath, break the stripes of a vase.
 
-Where the matte is soft, hair is mirrored at its rim over the side, which is drawn as it looks
-after a turn by 45 degrees and takes the photo's place sooner there. Of a corgi, a collie, a cat and
-a teddy that were turned by 25 degrees a pale or clay-like band beside the outline is gone or much
+Where the matte is soft, hair is mirrored at its rim over the side, which is drawn as it looks after
+a turn by 45 degrees and takes the photo's place sooner there. Of a corgi, a collie, a cat and a
+teddy that were turned by 25 degrees a pale or clay-like band beside the outline is gone or much
 narrower, and no eye or nose comes twice; this was chosen on them. A toy wolf, on which nothing was
 chosen, changes little: it had no such band. A quokka, lit from behind, got a pale side by it, until
-a fringe that is lighter than what lies inside it was taken for as deep as before. Eight solids, whose edges are crisp (box, domino, card,
-mug, brick, cup, ring, vase), come out 0.1 dB higher of a pitch by 20 degrees, 0.1 lower of a turn
-by 20 and the same of one by 35; the domino loses 1.0 dB to one side. The tables above are of the
-version before.
+a fringe that is lighter than what lies inside it was taken for as deep as before. Eight solids,
+whose edges are crisp (box, domino, card, mug, brick, cup, ring, vase), come out 0.1 dB higher of a
+pitch by 20 degrees, 0.1 lower of a turn by 20 and the same of one by 35; the domino loses 1.0 dB to
+one side. The tables above are of the version before.
 
 A mask that was drawn around hair takes in the background between it, which stood beside a turned
 head as a shell. Where the mask lies on no edge of the picture and colours agree, the matte is now
