@@ -27,7 +27,8 @@ a few plain shapes: a box, an ellipsoid, a ring, a surface of revolution whose p
 the outline. The one that describes the object in the fewest words takes the place of the network's
 surface as far as it explains it, rights how the whole leans, and gives the far side that no photo
 shows; where none does, the shape stays free. Whether the object is a flat sheet the network says
-outright. An outline that is mostly one ellipse is the rim of a plate or a bowl, and a second,
+outright; what has a handful of colours, each the same all over, is a drawing, and flat, too: no
+light falls on it. An outline that is mostly one ellipse is the rim of a plate or a bowl, and a second,
 nearer circle is the lip of a cup; where the far half of what the ellipse encloses is steep, it is
 the hole of a ring seen aslant. A handle lies in a plane through the axis of what it is on.
 `--shape`, or Kind in the Shape panel, overrules all that.

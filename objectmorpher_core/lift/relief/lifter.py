@@ -31,6 +31,7 @@ from ..shapes import (
     completed,
     flattened,
     laid,
+    looks_drawn,
     recognised,
     rims_of,
     rod_look,
@@ -151,7 +152,11 @@ class ReliefLifter:
         # one, and is rarer.
         rims = rims_of(seen, subject.camera) if settings.kind == "auto" else []
         is_rim = bool(rims) and rims[0].is_steep
-        shape = closed_ring(seen, rims[0]) if is_rim else recognised(seen, settings.kind)
+        shape = (
+            closed_ring(seen, rims[0])
+            if is_rim
+            else recognised(seen, settings.kind, looks_drawn(subject.matte))
+        )
         return _Sight(seen, shape, rims if is_rim and shape is None else [])
 
     def _body(

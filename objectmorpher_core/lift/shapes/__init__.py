@@ -8,11 +8,19 @@ most gives the object's front and back as far as it explains them; the rest stay
 
 from __future__ import annotations
 
-from .recognition import Recognised, closed_ring, completed, flattened, recognised, rounded
+from .recognition import (
+    Recognised,
+    closed_ring,
+    completed,
+    flattened,
+    looks_drawn,
+    recognised,
+    rounded,
+)
 from .rims import Rim, rims_of
 from .tableware import laid
 
 __all__ = [
-    "Recognised", "Rim", "closed_ring", "completed", "flattened", "laid", "recognised", "rims_of",
-    "rounded",
+    "Recognised", "Rim", "closed_ring", "completed", "flattened", "laid", "looks_drawn",
+    "recognised", "rims_of", "rounded",
 ]  # fmt: skip

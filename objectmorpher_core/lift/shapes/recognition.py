@@ -10,6 +10,7 @@ import numpy as np
 from ...base.arrays import F64, Mask
 from ...base.camera import Camera
 from ...base.poisson_disk import nearest_in
+from ...document.model import Matte
 from ..relief.body import ReliefBody
 from ..relief.canvas import carried_on
 from ..relief.cuts import Cuts
@@ -25,7 +26,7 @@ from .rods import Axis, AzimuthOf, TurnedBody
 from .round import fit_closed_ring, fit_ellipsoid, fit_revolution, fit_ring
 from .solids import Drawn, Mesh, RayGrid, drawn
 
-SHEET = 0.012  # x extent: half of a flat thing's thickness
+SHEET, DRAWN = 0.012, 0.004  # x extent: half of a flat thing's thickness, and of a drawing's
 BEYOND = 2.0  # cells from a shape's own outline, up to which its sides go on
 MISSED = 4.0  # cells from a shape's outline, up to which a silhouette ends as it does
 REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside it
@@ -44,6 +45,11 @@ WHOLE = 0.85  # weight, from which it is nothing but the shape
 FLAT = 2.0
 SIDED = 2.0  # log odds that are asked on top where a box shows two sides: no sheet does
 RECTANGLE = 1.0  # log odds that an outline adds which is a rectangle in perspective
+# Of a drawing: its colours, the share of it that has one of these to a level, the levels between
+# any two, and how much of it must be neither nearly white nor dark. A cartoon with a contour has
+# .86, small drawings in JPEG files .45 and more, and photographed things up to .1.
+PALETTE, PAINTED, APART, TELLING, DARK, LIGHT = 5, 0.4, 12, 0.3, 48, 250
+OPAQUE, SAMPLE, LEAST_DRAWN = 0.99, 20_000, 100  # alpha; px
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
 EXPLAINED = 0.95  # weight, from which no other shape is tried
 STANDS, LYING = 0.5, 0.5  # weight of a shape that shows what is up, and cosine to the upright
@@ -69,6 +75,7 @@ class Recognised:
     description: float = 0.0  # length, of a solid
     likeness: float = 1.0  # how much it would be believed if the artist did not say so
     own: F64 | None = None  # (s, s) px of the crop: negative where its selection is none of it
+    half: float = SHEET  # x extent: half of a sheet's thickness
 
     @property
     def up(self) -> F64 | None:
@@ -157,40 +164,63 @@ def closed_ring(seen: SeenShape, rim: Rim) -> Recognised | None:
     return ring if ring.description < LIKELY and ring.misfit.normal < FACED else None
 
 
-def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:
+def recognised(seen: SeenShape, kind: str = "auto", is_drawing: bool = False) -> Recognised | None:
     """The shape of what is seen; None where it is none of these.
 
-    `kind`: "auto", or what the artist says it is: "round", "flat" or "box".
+    `kind`: "auto", or what the artist says it is: "round", "flat" or "box". A drawing is a sheet,
+    but of a box: that has sides of one colour each in a picture that was computed, too.
     """
     evidence = Evidence.of(seen)
     if evidence.sure.sum() < LEAST_SURE or kind not in ("auto", "round", "flat", "box"):
         return None
     if kind != "auto":
-        found = _sheet(evidence) if kind == "flat" else _solid(kind, evidence)
+        found = _sheet(evidence, is_drawing) if kind == "flat" else _solid(kind, evidence)
         likeness = found.weight
         if kind == "box" and likeness < LEAST:
             found = _described(kind, fit_about(evidence.core()), evidence, 0.0)
         return replace(found, weight=1.0, likeness=likeness)
     odds = seen.flatness + (RECTANGLE if evidence.is_four_cornered else 0.0) - FLAT
+    odds = max(odds, 0.0) if is_drawing else odds
     if odds >= SIDED:
-        return _sheet(evidence)
+        return _sheet(evidence, is_drawing)
     box = _solid("box", evidence)
     if _shows_sides(box):
         if box.weight > EXPLAINED:
             return box
     elif odds >= 0:
-        return _sheet(evidence)
+        return _sheet(evidence, is_drawing)
     best = min(box, _solid("round", evidence), key=_length)
     return best if best.weight >= LEAST else None
+
+
+def looks_drawn(matte: Matte) -> bool:
+    """Whether the object has a handful of colours, each all over alike: no light falls on it."""
+    pixels = np.rint(255 * matte.foreground[matte.alpha > OPAQUE]).astype(np.int64)
+    pixels = pixels[:: len(pixels) // SAMPLE + 1]
+    says_nothing = (pixels < DARK).all(1) | (pixels > LIGHT).all(1)  # so exposed, all things are
+    left = pixels[~says_nothing]
+    count = len(left)
+    if count < max(LEAST_DRAWN, TELLING * len(pixels)):
+        return False
+    painted = 0
+    for _ in range(PALETTE):
+        if len(left) == 0:
+            break
+        colours, counts = np.unique(left, axis=0, return_counts=True)
+        off = np.abs(left - colours[counts.argmax()]).max(1)
+        painted += np.count_nonzero(off <= 1)
+        left = left[off > APART]
+    return bool(painted > PAINTED * count)
 
 
 def _length(found: Recognised) -> float:
     return found.description
 
 
-def _sheet(evidence: Evidence) -> Recognised:
+def _sheet(evidence: Evidence, is_drawing: bool) -> Recognised:
     plane, misfit = fit_flat(evidence)
-    return Recognised("flat", misfit, 1.0, evidence, None, plane)
+    half = DRAWN if is_drawing else SHEET
+    return Recognised("flat", misfit, 1.0, evidence, None, plane, half=half)
 
 
 def _solid(kind: str, evidence: Evidence) -> Recognised:
@@ -288,7 +318,7 @@ def completed(
     near, far = (focal - np.exp(away) * side for side in (places.near, places.far))
     if shape.plane is not None:
         share = np.full(outline.shape, trust * places.weight)
-        return _as_sheet(body, near - SHEET * outline.extent, share, thickness)
+        return _as_sheet(body, near - shape.half * outline.extent, share, thickness * shape.half)
     # The shape shows how it leans better than a network does, also of what sticks out of it.
     lean = _plane(near - front, compared, outline)
     body = replace(body, middle=body.middle + trust * places.weight * lean)
@@ -322,7 +352,7 @@ def _solid_of(shape: Recognised, own: Mask, away: float, camera: Camera) -> Plai
 
 def flattened(body: ReliefBody, thickness: float) -> ReliefBody:
     """`body` as a sheet that lies as its middle does."""
-    return _as_sheet(body, body.middle, np.ones(body.silhouette.shape), thickness)
+    return _as_sheet(body, body.middle, np.ones(body.silhouette.shape), thickness * SHEET)
 
 
 def rounded(body: ReliefBody, thickness: float) -> ReliefBody:
@@ -343,8 +373,8 @@ def rounded(body: ReliefBody, thickness: float) -> ReliefBody:
     return _whole(body, share)
 
 
-def _as_sheet(body: ReliefBody, middle: F64, share: F64, thickness: float) -> ReliefBody:
-    half = np.full(share.shape, thickness * SHEET * body.silhouette.extent)
+def _as_sheet(body: ReliefBody, middle: F64, share: F64, half_extent: float) -> ReliefBody:
+    half = np.full(share.shape, half_extent * body.silhouette.extent)
     sides = [side.mixed(half, share) for side in (body.front, body.back)]
     middle = body.middle + share * (middle - body.middle)
     body = replace(body, middle=middle, front=sides[0], back=sides[1], kind="flat")

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import ConvexHull, KDTree
+from skimage.data import coffee
 
-from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.arrays import Mask, Pixels
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.poisson_disk import nearest_in
 from objectmorpher_core.base.rotations import turn_matrix
@@ -24,7 +25,13 @@ from objectmorpher_core.lift.relief.plain_solid import IN_LINE, INSET, PlainSoli
 from objectmorpher_core.lift.relief.shape_look import SeenShape
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.spreading import spread
-from objectmorpher_core.lift.shapes import completed, flattened, recognised, rounded
+from objectmorpher_core.lift.shapes import (
+    completed,
+    flattened,
+    looks_drawn,
+    recognised,
+    rounded,
+)
 from objectmorpher_core.lift.shapes.solids import (
     Mesh,
     RayGrid,
@@ -36,6 +43,7 @@ from objectmorpher_core.lift.shapes.solids import (
     sheet,
     tube,
 )
+from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_research.training.shape_eval import Surfaces, camera_of, score, surfaces_of
 
 WIDTH = 0.8  # tangents, of the crop
@@ -265,6 +273,49 @@ def test_the_artist_says_what_it_is() -> None:
         assert found is not None
         assert (found.kind, found.weight) == (kind, 1.0)
     assert recognised(seen, "free") is None
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_drawing_is_a_sheet_and_nothing_that_light_falls_on(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    side, mask = 300, np.zeros((300, 300), np.uint8)
+    bodies = [(*rng.integers(110, 190, 2), *rng.integers(40, 100, 2)) for _ in range(4)]
+    paint, ink = np.full((side, side, 3), 255, np.uint8), rng.integers(0, 60, 3)
+    for tones, grown in ((ink, 6), (None, 0)):  # the contour lies around them all
+        for x, y, across, down in bodies:
+            axes = int(across + grown), int(down + grown)
+            tone = rng.integers(60, 230, 3) if tones is None else tones
+            cv2.ellipse(paint, (int(x), int(y)), axes, 0, 0, 360, [int(c) for c in tone], -1)
+            cv2.ellipse(mask, (int(x), int(y)), axes, 0, 0, 360, 1, -1)
+    up, left = np.mgrid[-1 : 1 : side * 1j, -1 : 1 : side * 1j]
+    light = np.clip(1 - 0.3 * up - 0.3 * left - 0.3 * (up**2 + left**2), 0, 1)[..., None]
+
+    def is_drawn(picture: Pixels) -> bool:
+        saved = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 92])[1]
+        return looks_drawn(cut_out(cv2.imdecode(saved, cv2.IMREAD_COLOR), mask > 0))
+
+    assert is_drawn(paint)
+    assert not is_drawn((light * paint).astype(np.uint8)), "the same in light"
+    assert not is_drawn((0.1 * paint * light).astype(np.uint8)), "nor almost in the dark"
+    photo = coffee()[:side, 100 : 100 + side]
+    assert not is_drawn(np.ascontiguousarray(photo))
+    assert not is_drawn(np.full_like(paint, 254)), "what is overexposed may be anything"
+
+
+def test_a_drawn_ball_is_flat_and_a_box_of_three_colours_still_a_box() -> None:
+    ball, _ = seen_of("ball")
+    found = recognised(ball, is_drawing=True)
+    assert found is not None and found.kind == "flat"
+    thin, thick = (
+        surfaces_of(completed(body, shape, camera, 1.0, 1.0), ball.mask).thickness[ball.mask].max()
+        for body, camera in [body_of(ball)]
+        for shape in (found, recognised(ball, "flat"))
+        if shape is not None
+    )
+    assert thin < 0.5 * thick, "paper is thinner than a board"
+    solid, _ = seen_of("box")
+    found = recognised(solid, is_drawing=True)
+    assert found is not None and found.kind == "box"
 
 
 def test_without_trust_or_a_network_a_sheet_and_a_tube_are_still_made() -> None:
