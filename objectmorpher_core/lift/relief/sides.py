@@ -425,7 +425,8 @@ def _filled(side: _Side, front: SidePicture, seed: int) -> U8 | None:
     colors = np.where(completion.hole[..., None], toned, small)
     crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
     colors = np.clip(colors, 0, 255).astype(np.float32)
-    filled = with_detail(crop, whole, colors, completion.sources)
+    own = levels[picture.is_object]  # neither is what is invented lighter or darker
+    filled = with_detail(crop, whole, colors, completion.sources).clip(own.min(0), own.max(0))
     share = _alike(completion.colors, coarse, small, sure)
     share = np.where(whole, cv2.resize(share, hole.shape[::-1]), 1.0)[..., None]
     filled = (crop + share * (filled.astype(np.float32) - crop)).astype(np.float32)
