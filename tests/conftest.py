@@ -146,8 +146,9 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 LONG = (  # files and folders of which a test takes long: they begin
     "test_worker_killed",  # it lifts the ball, while the next ones do not need that
-    "tests/fuzz", "tests/faults", "tests/soak", "test_cli_truth", "test_documented", "test_warm_up",
-    "test_tools", "test_train", "core/segment", "test_autosave",
+    "test_documented", "test_accuracy", "tests/fuzz", "test_undo", "test_cluster", "test_plugins",
+    "test_warm_up", "tests/faults", "tests/soak", "test_cli_truth", "test_tools", "test_train",
+    "test_served_front", "core/segment", "test_autosave", "test_torch_setup", "test_estimates",
     "test_worker", "test_window", "test_first_use", "test_refin", "app/editing", "app/tools",
     "tests/app", "core/compose",
 )  # fmt: skip

@@ -10,7 +10,7 @@ photo shows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -192,15 +192,18 @@ def score(shot: Shot, truth: Shot) -> Score:
     )
 
 
-def measured(scene: Scene) -> dict[tuple[str, str], tuple[Shot, Score]]:
-    """What each way predicts of each edit."""
+def measured(scene: Scene, ways: Sequence[str] = WAYS) -> dict[tuple[str, str], tuple[Shot, Score]]:
+    """What each of the ways predicts of each edit."""
     matte, lifted = lift_mask(scene.pixels, CAMERA, scene.mask, settings=ALONE)
-    _, learned = lift_mask(scene.pixels, CAMERA, scene.mask, settings=SEEN)
-    seen = NetworkDepth((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
-    subject = LiftSubject(scene.pixels, CAMERA, scene.mask, matte)
-    deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(trust=0), silent)
-    _, inflated = lift_mask(scene.pixels, CAMERA, scene.mask, settings=INFLATED)
-    lifts = {"network": learned, "relief": lifted, "inflation": inflated, "depth": deep}
+    lifts = {"relief": lifted}
+    for way, settings in (("network", SEEN), ("inflation", INFLATED)):
+        if way in ways:
+            _, lifts[way] = lift_mask(scene.pixels, CAMERA, scene.mask, settings=settings)
+    if "depth" in ways:
+        seen = NetworkDepth((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
+        subject = LiftSubject(scene.pixels, CAMERA, scene.mask, matte)
+        deep = ReliefLifter(lambda pixels, mask: seen)
+        lifts["depth"] = deep.lift(subject, LiftSettings(trust=0), silent)
     puppets = {way: Puppet(own, DeformSettings(), CAMERA) for way, own in lifts.items()}
     textures = {way: object_texture(matte, own) for way, own in lifts.items()}
     found = {}
@@ -213,8 +216,8 @@ def measured(scene: Scene) -> dict[tuple[str, str], tuple[Shot, Score]]:
         if not edit.bend:
             drawers["card"] = lambda shift, e=edit: _warped(matte, _card(scene, matte, e), shift)
         drawers["affine"] = lambda shift, k=key: _warped(matte, _affine(scene, k), shift)
-        for way, draw in drawers.items():
-            shot = _aligned(draw, truth)
+        for way in (way for way in ways if way in drawers):
+            shot = _aligned(drawers[way], truth)
             found[key, way] = (shot, score(shot, truth))
     return found
 

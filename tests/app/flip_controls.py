@@ -48,6 +48,7 @@ class Flipper:
         landmarks._file = str(folder / "landmarks.json")
         options = WindowOptions(renderer="tiles", size=SIZE, scale=1.0)
         self._window = Window(options, open_window(options))
+        imgui.get_io().mouse_double_click_time = 0.0  # however fast one gesture follows another
         self.editor = self._window.editor
         self.editor.settings = replace(self.editor.settings, motion="reduced", gaussians=2500)
         self._document = worked_on(made_document())
@@ -63,7 +64,7 @@ class Flipper:
         editor.current, editor.view.compose = 0, ComposeView()
         editor.view.selecting.painted, editor.view.pose.mode = Painted.SELECTION, PoseMode.DRAG
         editor.view.wants_panel = True
-        self._hold(2.0, SIZE[1] - 2.0)
+        self._point(2.0, SIZE[1] - 2.0)
         unfold(editor)
         if not is_lifted:
             self.settle()  # its background is that of no object now
@@ -91,16 +92,26 @@ class Flipper:
             if x0 > PANEL and not any(part in label for part in LEFT_ALONE)
         }
 
-    def _hold(self, x: float, y: float, is_down: bool = False) -> None:
+    def _point(self, x: float, y: float) -> None:
+        """The next frame sees the pointer there."""
         imgui.get_io().add_mouse_pos_event(x, y)
-        self.frames(1)
+
+    def _press(self, is_down: bool) -> None:
+        """Also when the press is known in the frame that follows."""
         imgui.get_io().add_mouse_button_event(0, is_down)
         self.frames(2)
 
     def click(self, x: float, y: float) -> None:
-        self._hold(x, y)
-        self._hold(x, y, True)
-        self._hold(x, y)
+        self.drag(x, y, 0.0)
+
+    def drag(self, x: float, y: float, far: float = DRAG) -> None:
+        self._point(x, y)
+        self.frames(1)
+        self._press(True)
+        for share in (0.5, 1.0) if far else ():
+            self._point(x + share * far, y)
+            self.frames(1)
+        self._press(False)
 
     def press_escape(self) -> None:
         """Close what a click has opened."""
@@ -108,12 +119,6 @@ class Flipper:
             imgui.get_io().add_key_event(imgui.Key.escape, is_down)
             self.frames(1)
         self.settle()
-
-    def drag(self, x: float, y: float) -> None:
-        self._hold(x, y)
-        for share in (0.0, 0.5, 1.0):
-            self._hold(x + share * DRAG, y, True)
-        self._hold(x + DRAG, y)
 
 
 def worked_on(document: Document) -> Document:

@@ -24,6 +24,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.session.file import decode_session
+from tests import remembered
 
 WIDTH, HEIGHT = 240, 160  # px of the made photo
 AROUND = (48 + 300, 32 + 28)  # points of the window beside the canvas
@@ -41,6 +42,10 @@ TURN = (-65.0, 0.0, 0.0)  # degrees
 
 def made_document() -> Document:
     """A striped club before a plain wall, bent and turned: some of its back is seen."""
+    return remembered.once(b"the striped club", _made)
+
+
+def _made() -> Document:
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
     wall = np.stack([60 + 0.1 * x, 92 + 0.25 * y, 120 + 0.1 * x], -1)
     across = (x - 100) / np.interp(y, [20, 60, 110, 145], [17, 20, 36, 28])

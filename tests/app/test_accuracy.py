@@ -10,7 +10,7 @@ import pytest
 from editor_steps import open_file, wait_for_jobs
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.settings import Settings
+from objectmorpher.editor.settings import Backends, Settings
 from objectmorpher.editor.view import ToolName
 from objectmorpher.system.resources import resource
 from objectmorpher.tools.registry import TOOLS
@@ -27,7 +27,8 @@ PIXEL = 1.0  # canvas px
 
 @pytest.fixture(scope="module")
 def own_editor() -> Iterator[Editor]:
-    editor = Editor(Settings())
+    # What is behind the objects does not matter here: it is filled in a moment.
+    editor = Editor(Settings(backends=Backends(inpaint="telea")))
     editor.view.resize((1092, 840), 1.0, None)
     yield editor
     editor.shut_down()

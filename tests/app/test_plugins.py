@@ -79,10 +79,10 @@ def edited(networks: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.window
 def test_the_window_sends_layers_back_and_closes(
-    window_environment: dict[str, str], photo_path: Path, tmp_path: Path
+    without_networks: dict[str, str], photo_path: Path, tmp_path: Path
 ) -> None:
     back = tmp_path / "back.ora"
-    with opened(window_environment, photo_path, "--return", str(back)) as hands:
+    with opened(without_networks, photo_path, "--return", str(back)) as hands:
         hands.click(*screen_xy(*CENTRE))
         hands.choose("Lift object")
         hands.place("Drag a point on the object")

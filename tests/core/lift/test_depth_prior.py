@@ -258,7 +258,7 @@ def test_with_true_depth_solids_turn_better_than_from_their_outline(
     monkeypatch.setattr(turning, "EDITS", turns)
     gains = []
     for name in solids.MADE:
-        found = turning.measured(turning.make_scene(name, LIFTING))
+        found = turning.measured(turning.make_scene(name, LIFTING), ("relief", "depth"))
         plain, deep = (
             turning.mean(score for (_, own), (_, score) in found.items() if own == way)
             for way in ("relief", "depth")
