@@ -34,7 +34,6 @@ from .raster.surface import draw_layers
 from .raster.texture import build_levels
 
 SIZE = 96  # px
-NODES = 8  # unknowns of a made system
 FEW_SURFELS, FEW_PIXELS = 30, 8  # with which every rotation is tried in a moment
 
 
@@ -82,12 +81,8 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     from .compose.light.grain import Grain, sketch_grain
     from .compose.light.noise import BANDS, find_noise
     from .compose.light.relight import Relit
-    from .lift.relief.integration import solved
     from .pipeline import lift_mask, make_plate
-    from .segment.matting.closed_form import affine
 
-    empty = np.zeros((4, 4))
-    solved(empty, empty, empty, empty, empty, empty, 1, 1.0)  # after the shape network's look
     small = np.zeros((4, 4), np.float32)
     clear = np.zeros((4, 4, 4), np.uint8)
     Relit(small, 0.0, 0.0, 1.0).lit_rgba(clear, 0.0, 0.0, 1.0)
@@ -99,7 +94,6 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
         grain.grained(np.zeros((4, 4, 3), np.float32), small, 0, 0)
         splats = puppet.posed(thing.pose, Placement(scale=1.3))
         sketch_grain(splats, noise, 1.0, document.photo.camera)
-    affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
     deep = document.photo.pixels.astype(np.uint16) * np.uint16(257)
     assert thing.mask is not None and thing.matte is not None
     make_plate(deep, thing.mask)
@@ -112,11 +106,8 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
 
 
 def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
-    """Strain as a colour, Gaussians split, the paper as printed, thousands of control points."""
-    from scipy.sparse import csr_array
-
+    """Strain as a colour, Gaussians split, the paper as printed."""
     from .compose.composite import object_texture
-    from .deform.response import SparseResponse
 
     assert thing.pose is not None and thing.matte is not None
     puppet.deformer.strain(thing.pose)
@@ -128,7 +119,6 @@ def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
         other = Puppet(puppet.lifted, settings, camera)
         solution = other.deformer.solve(thing.handles)
         other.draw(solution.pose, Placement(), texture, camera)
-    SparseResponse(csr_array(np.eye(NODES))).solve(np.ones((NODES, 3)))
 
 
 def _register(document: Document, thing: EditObject) -> None:

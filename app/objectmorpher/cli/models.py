@@ -10,7 +10,7 @@ from pathlib import Path
 
 from objectmorpher_core import lift, model_sets, models
 from objectmorpher_core.lift.workers import file as worker_file
-from objectmorpher_core.models import Added, CacheState, HubModel, HubState, TrunkState
+from objectmorpher_core.models import Added, CacheState, HubModel, HubState
 
 from .idle_options import refuse_idle, said_on
 from .terminal import UsageError, progress_bar
@@ -50,12 +50,9 @@ def _add(id: str, source: Path, is_converted: bool) -> None:
     if id in {kind.id for kind in models.KINDS}:
         _write(_line_of_added("list", models.add(id, source)))
         return
-    if id in _trunks():
-        _write(_line_of_trunk("list", models.add_trunk(id, source)))
-        return
     known = (*models.families(), *(model.id for model in models.hub_models()))
     if id not in known:
-        names = ", ".join((*(kind.id for kind in models.KINDS), *known, *_trunks()))
+        names = ", ".join((*(kind.id for kind in models.KINDS), *known))
         raise UsageError(f"nothing can be added as {id!r}; known are {names}")
     _write(_line_of_hub("list", models.use_folder(id, source)))
 
@@ -65,8 +62,6 @@ def _remove(id: str) -> None:
         models.remove_hub(id)
     elif id in {weight.id for weight in models.weights()}:
         models.remove_weight(id)
-    elif id in _trunks():
-        models.remove_trunk(id)
     elif id in worker_file.worker_names():
         worker_file.forget_licence(id)
     else:
@@ -79,12 +74,6 @@ def _get(options: argparse.Namespace) -> None:
     if id in {known.id for known in models.model_sets()}:
         _get_set(id, options)
         return
-    if id in _trunks():
-        trunk = models.trunk(id)
-        raise UsageError(
-            f"{id} is not fetched: download {' or '.join(trunk.files)} by way of {trunk.page},"
-            f" then objectmorpher models add {id} FILE"
-        )
     if id in {model.id for model in models.hub_models()}:
         wanted = models.missing(id)
         if wanted and all(model.repository for model in wanted):
@@ -182,21 +171,17 @@ def _consent(told: str, id: str, is_agreed: bool, verb: str = "download") -> Non
 def _look(action: str, id: str | None) -> None:
     """Lists one of them or all, prints their places, or hashes them."""
     workers = tuple(name for name in worker_file.worker_names() if id in (None, name))
-    others = {known.id for known in (*models.KINDS, *models.hub_models(), *models.trunks())}
+    others = {known.id for known in (*models.KINDS, *models.hub_models())}
     is_worker = id is not None and bool(workers)
     states = () if id in others or is_worker else _states(action, id)
     brought = tuple(models.added(kind.id) for kind in models.KINDS if id in (None, kind.id))
     look = models.verify_hub if action == "verify" else models.look_hub
     several = tuple(look(model.id) for model in models.hub_models() if id in (None, model.id))
-    trunks = tuple(models.look_trunk(known) for known in _trunks() if id in (None, known))
     if action != "list" and id is None:  # what nobody has got is only listed
         several = tuple(state for state in several if state.state != "missing")
-        trunks = tuple(state for state in trunks if state.state != "missing")
         states = tuple(s for s in states if s.weight.category == "edit" or s.state != "missing")
     for state in states:
         _write(_line_of(action, state))
-    for official in trunks:
-        _write(_line_of_trunk(action, official))
     for own in brought:
         _write(_line_of_added(action, own))
     for found in several:
@@ -207,7 +192,6 @@ def _look(action: str, id: str | None) -> None:
     broken = [state.weight.id for state in states if state.state != "ok"]
     broken += [b.kind.id for b in brought if b.state == "damaged" or (id and b.state != "ok")]
     broken += [found.model.id for found in several if found.state != "ok"]
-    broken += [official.trunk.id for official in trunks if official.state != "ok"]
     if broken and action != "list":
         raise UsageError(f"{', '.join(broken)}: not installed or damaged, see `models list`")
 
@@ -222,17 +206,6 @@ def _line_of(action: str, state: CacheState) -> str:
         return _checked(action, weight.id, state)
     there = "installed" if state.state == "ok" else "not installed"
     return _columns(weight.id, _size(weight.size), weight.licence, there, weight.purpose)
-
-
-def _line_of_trunk(action: str, found: TrunkState) -> str:
-    """Of an official network of a measure: whether it is there, or how it can be."""
-    trunk = found.trunk
-    if action != "list":
-        return _checked(action, trunk.id, found, found.reason)
-    purpose = f"{trunk.name}, {trunk.purpose}"
-    if found.state == "missing":
-        purpose += f"; models add {trunk.id} FILE, {trunk.files[0]} from {trunk.page}"
-    return _columns(trunk.id, _size(trunk.size), trunk.licence, THERE[found.state], purpose)
 
 
 def _line_of_hub(action: str, found: HubState) -> str:
@@ -260,9 +233,7 @@ def _line_of_added(action: str, own: Added) -> str:
     return _columns(kind.id, "", "yours", THERE[own.state], told)
 
 
-def _checked(
-    action: str, id: str, found: CacheState | TrunkState | HubState | Added, reason: str = ""
-) -> str:
+def _checked(action: str, id: str, found: CacheState | HubState | Added, reason: str = "") -> str:
     """What `verify` and `path` say; `reason`: why it is damaged."""
     if action == "verify":
         return f"{id}: {found.state}{f' ({reason})' if reason else ''}"
@@ -279,10 +250,6 @@ def _line_of_worker(name: str) -> str:
     missing = worker.missing()
     told = f"a worker of yours that lifts{f'; {missing}' if missing else ''}"
     return _columns(name, "", licence, "not usable" if missing else "yours", told)
-
-
-def _trunks() -> tuple[str, ...]:
-    return tuple(known.id for known in models.trunks())
 
 
 def _columns(id: str, size: str, licence: str, there: str, purpose: str) -> str:

@@ -60,7 +60,6 @@ SEAM = 2.0  # x mean spacing: so near to what was hidden nothing of the photo is
 NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of the photo
 NEARNESS_EPS = 1e-3  # variance of colours in [0, 1] that counts as flat
 HIDDEN = 1e-6  # visibility of what faces the photo's camera and something else hides
-FAR = 2.0  # px of the crop, at least, from where an outline would be
 PROFILE = 1.2  # width over height, from which what stands is thought to be seen from the side
 
 Shaper = Callable[[ReliefSilhouette, Camera, LiftSettings, MirrorAxis | None], ReliefBody]
@@ -101,7 +100,6 @@ class ReliefLifter:
             raise LiftError(f"the object is only {area} pixels, too small to lift")
         progress(0.0, "Inflating the silhouette")
         sight = self._sight(subject, settings, progress)
-        subject, rough = sight.trimmed(subject)
         mask, camera, matte = subject.mask, subject.camera, subject.matte
         hidden = _hidden(subject, settings)
         canvas = _canvas(matte, hidden, area, settings.count)
@@ -116,8 +114,6 @@ class ReliefLifter:
         surface, spacing = spread(body, settings.count, band, rng, matte, is_fringed)
         if hidden is not None and hidden.any():
             surface = _unseen(surface, hidden, SEAM * spacing)
-        if rough is not None:  # of which the matte would show what is no part of it
-            surface = surface.select(np.flatnonzero(~(surface.is_brim & _holds(rough, surface.xy))))
         progress(0.7, "Colouring its back")
         is_mirrored = _is_mirrored(body, settings, axis)
         colours = colouring(canvas, outline, spacing, is_mirrored, axis)
@@ -136,7 +132,6 @@ class ReliefLifter:
         """The shape alone, on which `lift` spreads its Gaussians."""
         subject = replace(subject, mask=solid_part(subject.mask, subject.matte))
         sight = self._sight(subject, settings, silent)
-        subject, _ = sight.trimmed(subject)
         area = int(np.count_nonzero(subject.mask))
         canvas = _canvas(subject.matte, _hidden(subject, settings), area, settings.count)
         return self._body(subject, settings, _axis(canvas, settings), sight, silent)
@@ -213,30 +208,6 @@ class _Sight:
     seen: shape_look.SeenShape | None = None
     shape: Recognised | None = None
     rims: list[Rim] = field(default_factory=list)  # of what lies as plates do
-
-    def trimmed(self, subject: LiftSubject) -> tuple[LiftSubject, Mask | None]:
-        """`subject` without what its selection has of the background, and that, (H, W), if any."""
-        if self.seen is None or self.shape is None or self.shape.own is None:
-            return subject, None
-        x0, y0, x1, y1 = subject.matte.box
-        at = np.stack(np.meshgrid(np.arange(x0, x1), np.arange(y0, y1)), -1).astype(np.float64)
-        x, y = np.moveaxis(self.seen.crop.grid_xy(at + 0.5), -1, 0).astype(np.float32)
-        own = self.shape.own.clip(-FAR, FAR).astype(np.float32)
-        beyond = cv2.remap(own, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) < 0
-        alpha = np.where(beyond, 0, subject.matte.alpha).astype(np.float32)
-        rough = np.zeros_like(subject.mask)
-        height, width = rough.shape
-        inner = np.s_[max(-y0, 0) : height - y0, max(-x0, 0) : width - x0]
-        rough[max(y0, 0) : y1, max(x0, 0) : x1] = beyond[inner]
-        matte = replace(subject.matte, alpha=alpha)
-        return replace(subject, mask=subject.mask & ~rough, matte=matte), rough
-
-
-def _holds(mask: Mask, xy: F64) -> Mask:
-    """(N,) whether photo px (N, 2) are in `mask` (H, W)."""
-    limit = np.array(mask.shape[::-1]) - 1
-    x, y = np.clip(np.floor(xy).astype(int), 0, limit).T
-    return mask[y, x]
 
 
 def _shaped(

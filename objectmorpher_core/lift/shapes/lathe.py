@@ -9,7 +9,7 @@ profile: about a wrong one even a plain cylinder seems to taper towards its ends
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -17,9 +17,7 @@ import numpy as np
 
 from ...base.arrays import F64, Mask
 from ...base.kernel_files import numba
-from ...base.masks import dilated, disc
-from ..relief.standing import agreed_line
-from .evidence import INNER, OUTLINE_ERROR, STRIDE, Evidence
+from .evidence import STRIDE, Evidence
 from .solids import AROUND, Mesh, revolved
 
 TRIED = 40  # places on the axis, at which the profile's ends are looked for
@@ -31,6 +29,7 @@ CORNERS = 24  # of a circle, that are looked up in the outline
 SLACK = 0.5  # px that a circle may reach out of an outline, whose pixels are stairs
 HALVINGS = 12  # of an interval that holds a radius
 NEAREST = 0.8  # x its depth, that it may reach towards the camera
+ALIKE = 0.998  # cosine between two axes that are tried as one
 SHIFT = 4  # bits of a pixel's fraction, as OpenCV draws
 
 
@@ -230,59 +229,6 @@ def _radii(places, ways, inside, start, step, most):
     return found
 
 
-# An outline that is rough on one side: a selection's edge strays there, or something stands before.
-#
-# What was turned on a lathe is as wide on both sides of its axis, so the smoother side says what
-# the rougher one would be. The axis is where most places are as far away on both sides.
-
-ALIKE = 0.998  # cosine between two axes that are tried as one
-AGREED = 0.4  # share of the places along an axis, that are as far from it on both sides
-ROUGHER = 1.5  # x the other side's roughness
-MIDWAY = 2.0  # px, over which places are on one axis, to begin with
-TAKEN, ROUNDS = 0.25, 6  # share of an axis's places that are on its smooth side; of its fit
-APART, ROUGHEST = 3, 4.0  # px between places whose line is bent, and the most that one counts
-ENDS = 0.1  # x the length, that ends are not looked at: they are round
-SPUR = 0.04  # x extent, half the width of what sticks out and is rough on either side
-SLIVER = 0.04  # x extent, farther than which what sticks out is a knob, a corner or a wheel
-STRAY, BESIDE = 1.0, 3  # px of what is none of it, and around that, where its edge is none, either
-CHANGED = 0.045  # x the mask's area, at most
-
-
-@dataclass(frozen=True, eq=False)
-class Evened:
-    """Evidence of a thing as if its rougher side went as its smoother one."""
-
-    evidence: Evidence
-    own: F64  # (s, s) px of the crop from that side's image, negative beyond, where it is rough
-    changed: float  # x the mask's area, that differs
-
-
-def evened(evidence: Evidence) -> Evened | None:
-    """None where no side is much rougher than the other, or they differ by more than that."""
-    inside = _signed(evidence.fine)
-    sides = [_RoughSide.of(inside, way) for way in ways_of(evidence)]
-    tolerance = 0.5 * OUTLINE_ERROR * evidence.extent
-    rough = [side for side in sides if side is not None]
-    side = max(rough, key=lambda side: side.agreement(tolerance), default=None)
-    if side is None or side.agreement(tolerance) < AGREED:
-        return None
-    image, is_rough = side.mirrored(inside)
-    radius = round(SPUR * evidence.extent)
-    even = cv2.morphologyEx((image > 0).astype(np.uint8), cv2.MORPH_OPEN, disc(radius)) > 0
-    changed = float((even != evidence.fine).sum()) / float(evidence.fine.sum())
-    away = _signed(even)
-    if changed > CHANGED or -away[evidence.fine].min() > SLIVER * evidence.extent:
-        return None
-    own = slice(STRIDE // 2, None, STRIDE)
-    part = replace(
-        evidence, mask=even[own, own], fine=even, sure=evidence.sure & (away > INNER)[own, own],
-        outside=np.where(evidence.outside > 0, np.abs(away[own, own]), 0.0),
-    )  # fmt: skip
-    stray = dilated(evidence.fine & is_rough & (image < -STRAY), BESIDE)
-    found = Evened(part, np.where(stray & is_rough, image, np.inf), changed)
-    return found if part.sure.any() else None
-
-
 def ways_of(evidence: Evidence) -> list[F64]:
     """(2,) unit each: along which, in the picture, an axis may lie."""
     at = evidence.grid.tangents[evidence.mask]
@@ -296,78 +242,3 @@ def ways_of(evidence: Evidence) -> list[F64]:
         if all(abs(way @ other) <= ALIKE for other in found):
             found.append(way)
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _RoughSide:
-    """An axis, and on which side of it an outline is much rougher than on the other."""
-
-    centre: F64  # (2,) px on it
-    normal: F64  # (2,) unit, towards the rough side
-    off: F64  # (n,) px from it to the middle of the outline, at places along it
-
-    @staticmethod
-    def of(inside: F64, way: F64) -> _RoughSide | None:
-        """Of an outline, `inside` (s, s) px; the axis lies about along `way` (2,)."""
-        middle = np.asarray(np.argwhere(inside > 0)[:, ::-1].mean(0), np.float64)
-        along, left, right = _edges(inside, middle, way)
-        if len(along) < TRIED:
-            return None
-        start, lean = agreed_line(along, 0.5 * (left + right), MIDWAY)
-        normal = np.array([way[1], -way[0]])
-        middle, way = middle + start * normal, (way + lean * normal) / np.hypot(1, lean)
-        along, left, right = _edges(inside, middle, way)
-        cut = slice(int(ENDS * len(along)), len(along) - int(ENDS * len(along)))
-        rough = [_roughness(side[cut]) for side in (left, right)]
-        if max(rough) < ROUGHER * min(rough):
-            return None
-        # What is rough has more often taken something along than left something out.
-        sign, off = (1.0 if rough[1] > rough[0] else -1.0), 0.5 * (left + right)
-        line = np.zeros(2)
-        for _ in range(ROUNDS):
-            beyond = sign * (off - np.polyval(line, along))
-            weight = np.where(beyond > 0, TAKEN, 1 - TAKEN) / np.maximum(np.abs(beyond), 0.3)
-            line = np.polyfit(along, off, 1, w=np.sqrt(weight))
-        lean, start = line
-        normal = np.array([way[1], -way[0]])
-        middle, way = middle + start * normal, (way + lean * normal) / np.hypot(1, lean)
-        normal = sign * np.array([way[1], -way[0]])
-        return _RoughSide(middle, normal, off - np.polyval(line, along))
-
-    def agreement(self, tolerance: float) -> float:
-        """Share of the places that the axis halves to within `tolerance` px."""
-        return float((np.abs(self.off) < tolerance).mean())
-
-    def mirrored(self, inside: F64) -> tuple[F64, Mask]:
-        """`inside` (s, s), on the rough side as it is on the other; and where that is, (s, s)."""
-        at = np.stack(np.meshgrid(*map(np.arange, inside.shape[::-1])), -1).astype(np.float64)
-        beyond = (at - self.centre) @ self.normal
-        x, y = np.moveaxis(at - 2 * beyond[..., None] * self.normal, -1, 0).astype(np.float32)
-        image = cv2.remap(inside, x, y, cv2.INTER_LINEAR, borderValue=-float(len(inside)))
-        return np.where(beyond > 0, np.asarray(image), inside), beyond > 0
-
-
-def _edges(inside: F64, middle: F64, way: F64) -> tuple[F64, F64, F64]:
-    """Places (n,) px along `way` from a `middle`, and of an outline its left and right there."""
-    size = len(inside)
-    steps = np.arange(-size, size + 1.0)
-    along, across = np.meshgrid(steps, steps, indexing="ij")
-    at = middle + along[..., None] * way + across[..., None] * np.array([way[1], -way[0]])
-    x, y = np.moveaxis(at, -1, 0).astype(np.float32)
-    lines = cv2.remap(inside, x, y, cv2.INTER_LINEAR, borderValue=-float(size))
-    held = np.flatnonzero((lines > 0).any(1))
-    left, right = (_crossings(np.asarray(lines, np.float64)[held][:, ::side]) for side in (1, -1))
-    return steps[held], left - size, size - right
-
-
-def _crossings(lines: F64) -> F64:
-    """(n,) where each of `lines` (n, m) is first above 0, with fractions."""
-    rows, first = np.arange(len(lines)), np.argmax(lines > 0, axis=1)
-    high, low = lines[rows, first], lines[rows, np.maximum(first - 1, 0)]
-    return first - high / np.maximum(high - low, 1e-6)
-
-
-def _roughness(side: F64) -> float:
-    """Mean of how much a line (n,) bends from place to place, px."""
-    bends = np.abs(side[2 * APART :] - 2 * side[APART:-APART] + side[: -2 * APART])
-    return float(np.minimum(bends, ROUGHEST).mean())

@@ -20,7 +20,6 @@ from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
 from .boxes import fit_about, fit_box, fit_flat
 from .evidence import Evidence, Misfit
-from .lathe import evened
 from .rims import Rim
 from .rods import Axis, AzimuthOf, TurnedBody
 from .round import fit_closed_ring, fit_ellipsoid, fit_revolution, fit_ring
@@ -74,7 +73,6 @@ class Recognised:
     plane: F64 | None = None  # (3,) of a sheet: see `flats`
     description: float = 0.0  # length, of a solid
     likeness: float = 1.0  # how much it would be believed if the artist did not say so
-    own: F64 | None = None  # (s, s) px of the crop: negative where its selection is none of it
     half: float = SHEET  # x extent: half of a sheet's thickness
 
     @property
@@ -234,18 +232,12 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
     fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
     if fits[0].weight < EXPLAINED:
         fits += _turned(core, evidence, left_out)
-    best, looks = min(fits, key=_length), [(core, left_out)]
+    best = min(fits, key=_length)
     if left_out > STEM:  # a vase's neck, or a foot on a thin stem, is no handle
-        looks.append((evidence, 0.0))
         for whole in _turned(evidence, evidence, 0.0):
             # How it leans says what is seen within its outline, not that it is longer.
             is_known = best.weight >= WHOLE and _inner(whole) > _inner(best)
             best = best if is_known else min(best, whole, key=_length)
-    for part, more in looks if best.weight < EXPLAINED else []:
-        if (even := evened(part)) is not None:
-            fits = _turned(even.evidence, evidence, more + LEFT_OUT * even.changed)
-            own = np.where(evidence.fine & ~part.fine, np.inf, even.own)  # handles stay
-            best = min([best, *(replace(fit, own=own) for fit in fits)], key=_length)
     return best
 
 

@@ -13,146 +13,11 @@ from typing import Any
 import cv2
 import numpy as np
 import scipy.sparse as sparse
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from ...base.arrays import F32, F64, RGB, Mask, Sparse, frozen, frozen_rows
-from ...base.kernel_files import numba
+from ...base.arrays import F32, F64, RGB, Mask, Sparse
 from .features import BorderLine, Likeness, border_lines, cell_size, sample_tokens
-
-# Compiled queries of a graph of pieces, made many times a click.
-#
-# A graph is a symmetric sparse matrix of links, `indptr` (n + 1,), `indices` (m,) and `data` (m,)
-# as scipy lays it out by rows; nothing is linked with itself.
-
-
-def reached(links: Sparse, allowed: Mask, start: Mask) -> Mask:
-    """(n,) the pieces that can be reached from those of `start` (n,) within `allowed` (n,)."""
-    indptr, indices, _ = frozen_rows(links)
-    return _flood(indptr, indices, frozen(allowed), frozen(start))
-
-
-def highest(values: F64, low: np.ndarray, high: np.ndarray) -> F64:
-    """(n,) the largest of values[low[k] : high[k]], for bounds (n,) that never fall."""
-    largest = np.empty(len(values))
-    _slide(frozen(values), frozen(low, np.int64), frozen(high, np.int64), largest)
-    return largest
-
-
-def restarting(links: Sparse, allowed: Mask, free: Mask, stamina: float) -> Sparse:
-    """(f, f) the system of a walk among pieces `free` (n,) that ends on others, see `Pieces.grow`.
-
-    It goes nowhere that is not `allowed` (n,); all that is free is.
-    """
-    inner = *frozen_rows(links), frozen(allowed), frozen(free)
-    count = int(np.count_nonzero(free))
-    room = int(np.diff(links.indptr)[free].sum()) + count
-    indptr, indices = np.empty(count + 1, np.int32), np.empty(room, np.int32)
-    data = np.empty(room)
-    used = _collect(*inner, stamina, indptr, indices, data)
-    return sparse.csc_matrix((data[:used], indices[:used], indptr), (count, count))
-
-
-class Diagonals:
-    """Systems that differ on their diagonals: a diagonal less the links."""
-
-    def __init__(self, links: Sparse) -> None:
-        count = links.shape[0]
-        system = (sparse.diags(np.ones(count)) - links).tocsc()
-        system.sort_indices()
-        columns = np.repeat(np.arange(count), np.diff(system.indptr))
-        self._system, self._places = system, np.flatnonzero(system.indices == columns)
-
-    def system(self, diagonal: F64) -> Any:
-        """(n, n) with `diagonal` (n,)."""
-        data = self._system.data.copy()
-        data[self._places] = diagonal
-        return sparse.csc_matrix(
-            (data, self._system.indices, self._system.indptr), self._system.shape
-        )
-
-
-@numba.njit(cache=True, nogil=True)
-def _flood(indptr: np.ndarray, indices: np.ndarray, allowed: Mask, start: Mask) -> Mask:
-    count = len(allowed)
-    found = np.zeros(count, np.bool_)
-    stack = np.empty(count, np.int32)
-    size = 0
-    for k in range(count):
-        if start[k] and allowed[k]:
-            found[k] = True
-            stack[size] = k
-            size += 1
-    while size > 0:
-        size -= 1
-        here = stack[size]
-        for place in range(indptr[here], indptr[here + 1]):
-            there = indices[place]
-            if allowed[there] and not found[there]:
-                found[there] = True
-                stack[size] = there
-                size += 1
-    return found
-
-
-@numba.njit(cache=True, nogil=True)
-def _slide(values: F64, low: np.ndarray, high: np.ndarray, largest: F64) -> None:
-    """The places of falling values wait in a queue: its first is the largest of the window."""
-    queue = np.empty(len(values), np.int64)
-    first = last = taken = 0
-    for k in range(len(values)):
-        while taken < high[k]:
-            while last > first and values[queue[last - 1]] <= values[taken]:
-                last -= 1
-            queue[last] = taken
-            last += 1
-            taken += 1
-        while queue[first] < low[k]:
-            first += 1
-        largest[k] = values[queue[first]]
-
-
-@numba.njit(cache=True, nogil=True)
-def _collect(
-    from_indptr: np.ndarray,
-    from_indices: np.ndarray,
-    from_data: F64,
-    allowed: Mask,
-    free: Mask,
-    stamina: float,
-    indptr: np.ndarray,
-    indices: np.ndarray,
-    data: F64,
-) -> int:
-    """Fills the system's columns; how many entries there are."""
-    number = np.cumsum(free) - 1
-    used = column = 0
-    for here in range(len(free)):
-        if not free[here]:
-            continue
-        indptr[column] = used
-        degree, own = 0.0, -1
-        for place in range(from_indptr[here], from_indptr[here + 1]):
-            there = from_indices[place]
-            if not allowed[there]:
-                continue
-            degree += from_data[place]
-            if own < 0 and there > here:
-                own = used
-                indices[used] = column
-                used += 1
-            if free[there]:
-                indices[used] = number[there]
-                data[used] = -stamina * from_data[place]
-                used += 1
-        if own < 0:
-            own = used
-            indices[used] = column
-            used += 1
-        data[own] = degree + 1e-9
-        column += 1
-    indptr[column] = used
-    return used
-
 
 WORK_AREA = 280_000  # px of the reduced photo that is cut into pieces
 PIECES = 3000
@@ -181,8 +46,10 @@ class Growth:
         size = np.log(self.area)
         low = np.searchsorted(size, size - np.log(SPAN))
         high = np.searchsorted(size, size + np.log(SPAN), side="right")
-        peaks = highest(self.contrast, low, high)
-        return [int(k) for k in np.flatnonzero(self.contrast >= peaks - 1e-12)]
+        # `reduceat` takes each window's largest, and what lies between two windows in vain.
+        windows = np.column_stack([low, high]).ravel()
+        highest = np.maximum.reduceat(np.append(self.contrast, -np.inf), windows)[::2]
+        return [int(k) for k in np.flatnonzero(self.contrast >= highest - 1e-12)]
 
 
 class Pieces:
@@ -257,7 +124,6 @@ class Pieces:
         self._links = (half + half.T).tocsr()
         self._links.sort_indices()
         self._degrees = np.asarray(self._links.sum(1)).ravel()
-        self._systems = Diagonals(self._links)
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "_solver": None}  # a factorisation cannot be pickled
@@ -334,27 +200,36 @@ class Pieces:
 
         Both as the ease with which it passes on to a neighbour: at most about 1.
         """
-        system = self._systems.system(self._degrees + to_object + to_ground)
+        system = sparse.diags(self._degrees + to_object + to_ground) - self._links
         return _factored(system).solve(to_object)
 
     def reached(self, allowed: Mask, start: Mask) -> Mask:
         """(n,) the connected sets of pieces in `allowed` (n,) that hold one of `start` (n,)."""
-        return reached(self._links, allowed, start)
+        _, sets = connected_components(self._links[allowed][:, allowed], directed=False)
+        found = np.zeros(self.count, bool)
+        found[allowed] = np.isin(sets, sets[start[allowed]])
+        return found
 
     def _open(self) -> Any:
         if self._solver is None:
             everywhere = np.ones(self.count, bool)
-            links, stamina = self._links, self._stamina
-            self._solver = _factored(restarting(links, everywhere, everywhere, stamina))
+            self._solver = self._restarting(everywhere, everywhere)
         return self._solver
+
+    def _restarting(self, allowed: Mask, free: Mask) -> Any:
+        """The system (f, f) of a walk among `free` pieces that ends on others that are `allowed`.
+
+        Both are (n,), and all that is free is allowed.
+        """
+        degrees = self._links[free] @ allowed.astype(np.float64)
+        return _factored(sparse.diags(degrees + 1e-9) - self._stamina * self._links[free][:, free])
 
     def _visits_within(self, start: F64, allowed: Mask, walls: tuple[int, ...]) -> tuple[F64, Mask]:
         """(n,) how often each allowed piece is visited by a walk that ends at a wall; reached."""
         is_free = allowed.copy()
         is_free[list(walls)] = False
-        system = restarting(self._links, allowed, is_free, self._stamina)
         visits = np.zeros(self.count)
-        visits[is_free] = _factored(system).solve(start[is_free])
+        visits[is_free] = self._restarting(allowed, is_free).solve(start[is_free])
         return visits, self.reached(is_free, start > 0)
 
     def _growth(self, order: np.ndarray, allowed: Mask) -> Growth:
@@ -409,14 +284,15 @@ def _superpixels(image: RGB, count: int) -> np.ndarray:
     return labels.reshape(height, width).astype(np.int32)
 
 
-def _factored(system: Any) -> Any:
+def _factored(system: Sparse) -> Any:
     """A symmetric matrix in which every diagonal outweighs its row: no pivots are looked for.
 
     1.5 times as fast as SuperLU's general way, with half as many entries to solve with.
     """
     return splu(
-        system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+        system.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )  # fmt: skip
 
 
 def _cosine_gap(a: F32, b: F32) -> F64:

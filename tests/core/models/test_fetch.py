@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from objectmorpher.cli import parser as cli
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled
 
@@ -215,3 +216,20 @@ def test_a_mirror_that_lacks_it_or_does_not_answer_is_passed_over(cache, mirror,
     with pytest.raises(models.ModelError, match="no address of the web"):
         models.fetch(SMALL.id)
     assert left_in(cache) == []
+
+
+def test_what_only_evaluation_needs_is_not_missed_and_not_got_unasked(capsys, monkeypatch):
+    def said(*words: str) -> tuple[int, str, str]:
+        code = cli.main(["models", *words])
+        return code, *capsys.readouterr()
+
+    code, out, _ = said("list")
+    lines = {line.split()[0]: line for line in out.splitlines()}
+    assert code == 0 and "58.9 MB" in lines["hed-vgg"] and "not installed" in lines["hed-vgg"]
+    code, out, err = said("verify")
+    assert code == 1 and "hed-vgg" not in out + err and "dinov2-vits14: missing" in out
+    monkeypatch.setenv(models.OFFLINE, "1")
+    for id in ("hed-vgg", "lpips-alex"):
+        code, _, err = said("get", id)
+        assert code == 1 and id in err
+    assert {w.id for w in models.weights() if w.category == "edit"} == {"dinov2-vits14", "u2netp"}

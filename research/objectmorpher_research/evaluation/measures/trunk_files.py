@@ -1,31 +1,58 @@
 """The networks of the measures: which a measure needs, where its file is, and reading its numbers.
 
-The official ones come from elsewhere and are never fetched here: a folder of the user's, or
-`evaluation` among the models in the cache, holds them under the names that they are published with
-(models/published.py). Others are weights of the registry, each measure under a name of its own.
+The official ones (`TRUNKS`) come from elsewhere and are never fetched here, for no package carries
+them: a folder of the user's, or `evaluation` among the models in the cache, holds them under the
+names that they are published with. Others are weights of the registry, each measure under a name of
+its own.
 """
 
 from __future__ import annotations
 
 import pickle
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from objectmorpher_core import models
 from objectmorpher_core.models import device
-from objectmorpher_core.models.added import (
-    PLAIN,
-    check_published,
-    find_file,
-    hash_once,
-    trunk_folder,
-)
+from objectmorpher_core.models.fetch import sha256_of
+from objectmorpher_core.models.weight_folder import PLAIN
 
 from ..error import EvaluationError
 
 Tensors = Mapping[str, Any]  # torch.Tensor by its name in torchvision's state dict
 Shapes = Mapping[str, tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class Trunk:
+    """An official network, one file, which the user brings."""
+
+    name: str
+    files: tuple[str, ...]  # published names, which tell the first digits of the SHA-256
+
+    def check(self, path: Path, sha256: str) -> None:
+        """Raises EvaluationError where a file is not what its name says; safetensors have none."""
+        begins = path.name.rpartition("-")[2].partition(".")[0]
+        if path.suffix != PLAIN and not sha256.startswith(begins):
+            told = f"its SHA-256 starts with {sha256[: len(begins)]}, not {begins}"
+            raise EvaluationError(f"{path} is not {self.name} as published: {told}")
+
+
+TRUNKS = {
+    "alexnet": Trunk("AlexNet", ("alexnet-owt-7be5be79.pth", "alexnet-owt-4df8aa71.pth")),
+    "vgg16": Trunk("VGG16", ("vgg16-397923af.pth",)),
+    "inception-v3": Trunk(
+        "torchvision's Inception-v3",
+        ("inception_v3_google-0cc3c7bd.pth", "inception_v3_google-1a9a5a14.pth"),
+    ),
+    "fid-inception": Trunk(
+        "FID's Inception",
+        ("weights-inception-2015-12-05-6726825d.pth", "pt_inception-2015-12-05-6726825d.pth"),
+    ),
+}
 NEEDS: Mapping[str, tuple[str, ...]] = {  # ids of trunks and weights by the measure's name
     "lpips-alex": ("alexnet", "lpips-alex"),
     "lpips-vgg": ("vgg16", "lpips-vgg"),
@@ -54,10 +81,23 @@ def why_missing(measure: str, folder: Path | None = None) -> str | None:
 
 def find(id: str, folder: Path | None) -> Path | None:
     """The file of a trunk or a weight: in `folder`, or among the models where none is given."""
-    where = folder if folder is not None else trunk_folder()
-    if id in _trunks():
-        return find_file(_trunks()[id].files, where)
-    return find_file(HEADS.get(id, ()), where) or models.path(id)
+    where = folder if folder is not None else _usual_folder()
+    if id in TRUNKS:
+        return _first_of(TRUNKS[id].files, where)
+    return _first_of(HEADS.get(id, ()), where) or models.path(id)
+
+
+def _usual_folder() -> Path:
+    return models.folder() / "evaluation"
+
+
+def _first_of(names: tuple[str, ...], where: Path) -> Path | None:
+    """The first of the names that is in a folder, or the same tensors as safetensors."""
+    for name in names:
+        for path in (where / name, (where / name).with_suffix(PLAIN)):
+            if path.is_file():
+                return path
+    return None
 
 
 def checked(id: str, folder: Path | None) -> tuple[Path, str]:
@@ -66,14 +106,20 @@ def checked(id: str, folder: Path | None) -> tuple[Path, str]:
     if path is None:
         raise EvaluationError(_told_missing(id, folder))
     try:
-        if id in _trunks():
-            check_published(_trunks()[id], path)
-        sha256 = hash_once(path)
-    except models.ModelError as error:
-        raise EvaluationError(str(error)) from error
-    if id not in _trunks() and path.suffix != PLAIN and sha256 != models.weight(id).sha256:
+        sha256 = _sha256_of(path, path.stat().st_size, path.stat().st_mtime_ns)
+    except OSError as error:
+        raise EvaluationError(f"{path} cannot be read: {error.strerror or error}") from error
+    if id in TRUNKS:
+        TRUNKS[id].check(path, sha256)
+    elif path.suffix != PLAIN and sha256 != models.weight(id).sha256:
         raise EvaluationError(f"{path} is not the file that {id} is: wrong hash")
     return path, sha256
+
+
+@cache
+def _sha256_of(path: Path, _size: int, _changed: int) -> str:
+    """Of a file that has not changed, computed once in a process."""
+    return sha256_of(path)
 
 
 def read(path: Path, shapes: Shapes) -> dict[str, Any]:
@@ -109,13 +155,9 @@ def read(path: Path, shapes: Shapes) -> dict[str, Any]:
     return taken
 
 
-def _trunks() -> dict[str, models.Trunk]:
-    return {known.id: known for known in models.trunks()}
-
-
 def _told_missing(id: str, folder: Path | None) -> str:
-    if id not in _trunks():
+    if id not in TRUNKS:
         return f"the model {id} is not here: `objectmorpher models get {id}`"
-    known = _trunks()[id]
-    where = f"in {folder}" if folder else f"`objectmorpher models add {id} FILE`, or --weights DIR"
-    return f"{known.name} is not here ({known.files[0]}: {where})"
+    known = TRUNKS[id]
+    where = str(folder) if folder else f"{_usual_folder()}, or --weights DIR"
+    return f"{known.name} is not here ({known.files[0]} in {where})"

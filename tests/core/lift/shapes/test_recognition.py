@@ -8,13 +8,11 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import ConvexHull, KDTree
 from skimage.data import coffee
 
 from objectmorpher_core.base.arrays import Mask, Pixels
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.poisson_disk import nearest_in
 from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
@@ -204,49 +202,6 @@ def test_a_lid_seen_nearly_edge_on_reaches_its_far_rim() -> None:
     own = as_far(surfaces_of(whole, seen.mask), true, seen.mask & ~lid, camera)
     deep = float(np.ptp(true.front[lid]))
     assert np.abs(own.front - true.front)[lid].mean() < 0.15 * deep
-
-
-def _ragged(seen: SeenShape) -> SeenShape:
-    """Its left edge takes up to 3 % of its size of the background along, as a click may."""
-    mask, rows = seen.mask.copy(), np.flatnonzero(seen.mask.any(1))
-    waves = np.abs(gaussian_filter1d(np.random.default_rng(2).normal(size=SIDE), 3.0))
-    waves *= 0.035 * np.ptp(rows) / waves[rows].max()
-    for row in rows:
-        first = int(np.argmax(mask[row]))
-        mask[row, first - round(waves[row]) : first] = True
-    nearest = nearest_in(seen.mask)
-    beside = {
-        name: field.reshape(-1, *field.shape[2:])[nearest].reshape(field.shape)
-        for name in ("front", "thickness", "depth", "normal")
-        if (field := getattr(seen, name)) is not None
-    }
-    return replace(seen, mask=mask, **beside)
-
-
-def _turned(mesh: Mesh) -> Mask:
-    """(SIDE, SIDE) where it is seen, turned by 25 degrees."""
-    places = mesh.vertices / mesh.vertices[:, 2].mean()
-    middle = 0.5 * (places.min(0) + places.max(0))
-    turned = (places - middle) @ turn_matrix(25, 0, 0).T + middle
-    first = TANGENTS[:2] + (0.5 / SIDE - 0.5) * WIDTH
-    grid = RayGrid((float(first[0]), float(first[1])), WIDTH / SIDE, (SIDE, SIDE))
-    return drawn(mesh._replace(vertices=turned), grid).near > 0
-
-
-def test_of_a_lathes_work_the_smoother_side_says_what_it_is() -> None:
-    """What a selection has of the background on its other side is no part of it."""
-    seen, _ = seen_of("can")
-    ragged = _ragged(seen)
-    clean, found = recognised(seen), recognised(ragged)
-    assert clean is not None and clean.mesh is not None
-    assert found is not None and found.mesh is not None
-    assert found.kind == "round" and found.weight > 0.9
-    own, true = (_turned(each.mesh) for each in (found, clean) if each.mesh is not None)
-    assert (own & true).sum() / (own | true).sum() > 0.985
-    assert clean.own is None
-    assert found.own is not None
-    assert (found.own < 0)[ragged.mask & ~seen.mask].mean() > 0.5
-    assert (found.own < 0)[seen.mask].mean() < 0.01
 
 
 def test_a_box_that_is_said_of_what_is_none_lies_about_it() -> None:

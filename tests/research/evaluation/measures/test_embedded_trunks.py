@@ -197,6 +197,6 @@ def test_without_their_weights_it_is_said(monkeypatch, tmp_path, folder):
     a = folder("a", [photo("coffee")[:40, :40].copy()] * 2)
     lacking = {left.metric: left.reason for left in measure(find_pairs(a, a), Choices()).lacking}
     assert "objectmorpher models get hed-vgg" in lacking["hed-vgg-perceptual"]
-    assert "objectmorpher models add alexnet FILE" in lacking["lpips-alex"]
+    assert "alexnet-owt-7be5be79.pth in " in lacking["lpips-alex"]
     with pytest.raises(EvaluationError, match="hed-vgg-perceptual cannot be measured"):
         measure(find_pairs(a, a), Choices(("hed-vgg-perceptual",)))
