@@ -31,7 +31,8 @@ MOST_KEPT = 64  # copies; where every frame brings new things, the older ones go
 class Uploads:
     """Copies of things that do not change, until they are not asked for any more."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST_KEPT) -> None:
+        self._most = most
         self._kept: dict[tuple[str, int], tuple[Any, Releasable]] = {}
         self._used: set[tuple[str, int]] = set()
 
@@ -41,7 +42,7 @@ class Uploads:
         entry = self._kept.pop(key, None) or (thing, build())  # held: no other can get its id
         self._kept[key] = entry
         self._used.add(key)
-        while len(self._kept) > MOST_KEPT:
+        while len(self._kept) > self._most:
             self._kept.pop(next(iter(self._kept)))[1].release()
         copy: Any = entry[1]
         return copy
@@ -159,14 +160,14 @@ class PictureTexture:
         """
         fresh, self._touched = touched[self._touched :], len(touched)
         if pixels is not self._uploaded:
-            self._release()
+            self.release()
             self._uploaded, self._is_changing = pixels, bool(touched)
         elif fresh:
             self._is_changing = True
             if list(self._textures) == [0] and pixels is not None:
                 self._refresh(pixels, fresh)
             else:
-                self._release()
+                self.release()
         self._level = self._level_at(zoom)
         if self._level not in self._textures:
             shown = np.zeros((1, 1), np.uint8) if pixels is None else _as_u8(pixels)
@@ -198,7 +199,8 @@ class PictureTexture:
         part = np.ascontiguousarray(pixels[y0:y1, x0:x1])
         self._textures[0].write(part, viewport=(x0, y0, x1 - x0, y1 - y0), alignment=1)
 
-    def _release(self) -> None:
+    def release(self) -> None:
+        """Give the memory back."""
         for texture in self._textures.values():
             texture.release()
         self._textures.clear()

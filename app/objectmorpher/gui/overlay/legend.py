@@ -17,13 +17,14 @@ from ..widgets.panes import Rect
 from ..widgets.theme import PRIMARY, theme
 from ..widgets.widgets import bold_text, small_text
 from ..window.scenes import INPAINTED, LIFTED, REFINED
+from .canvas import DARK, WHITE
 
 WIDTH = 216.0  # points
 LINE = 20.0
 BAR = 12.0
 PAD = 12.0
 SWATCH = 14.0
-DARK, WHITE, GREY = "#0B0C0E", "#FFFFFF", "#B9BDC5"
+GREY = "#B9BDC5"
 
 
 class Legend:

@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.document.model import Prompt
 
-from ...commands import COMMANDS, keys_of, run, why_not
+from ...commands import run
 from ...editor.editor import Editor
 from ...system.texts import t
 from ..widgets.panes import has_panel
@@ -17,6 +17,7 @@ from ..widgets.theme import SMALL_SIZE, Icon, theme
 from ..widgets.widgets import (
     Emphasis,
     button,
+    command_icon,
     drawn_button,
     end_row,
     fill_row,
@@ -91,11 +92,8 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
     for i, (icon, name) in enumerate(buttons):
         imgui.same_line(left + i * (theme.pt(SIDE) + gap))
         imgui.set_cursor_pos_y(top - theme.pt(4))
-        keys = keys_of(editor, name)
-        hint = t(COMMANDS[name].label) + (f" ({keys})" if keys else "")
         # Below, the tooltip would be over the eye and the lock of the first row.
-        if icon_button(icon, name, hint, why_not(editor, name), SIDE, is_above=True):
-            run(editor, name)
+        command_icon(editor, name, icon, SIDE, is_above=True)
     imgui.pop_font()
 
 

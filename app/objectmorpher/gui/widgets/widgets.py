@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import COMMANDS, run, why_not
+from ...commands import COMMANDS, hint_of, run, why_not
 from ...editor.editor import Editor
-from ...render.gpu_memory import PictureTexture
+from ...render.gpu_memory import Uploads
 from ...render.renderer import Renderer
 from ...system.texts import t
 from ...tools.pointer import SNAP
@@ -31,23 +31,17 @@ class Textures:
 
     def __init__(self) -> None:
         self._renderer: Renderer | None = None
-        self._textures: dict[int, tuple[np.ndarray, PictureTexture]] = {}
+        self._kept = Uploads(KEPT)
 
     def use(self, renderer: Renderer) -> None:
         """The window's renderer, whose context owns the textures."""
-        self._renderer, self._textures = renderer, {}
+        self._renderer, self._kept = renderer, Uploads(KEPT)
 
     def texture(self, pixels: np.ndarray) -> imgui.ImTextureRef:
         """Return ImGui's texture of `pixels` (h, w, 3) u8."""
-        assert self._renderer is not None, "the window says which renderer"
-        found = self._textures.pop(id(pixels), None)
-        if found is None:
-            found = (pixels, self._renderer.picture(pixels))
-        self._textures[id(pixels)] = found
-        while len(self._textures) > KEPT:
-            oldest = next(iter(self._textures))
-            self._textures.pop(oldest)[1].texture.release()
-        return imgui.ImTextureRef(found[1].glo)
+        renderer = self._renderer
+        assert renderer is not None, "the window says which renderer"
+        return imgui.ImTextureRef(self._kept("", pixels, lambda: renderer.picture(pixels)).glo)
 
 
 pictures = Textures()
@@ -396,13 +390,23 @@ def checkbox(label: str, is_on: bool) -> bool:
 # A command as a button.
 
 
-def command_button(editor: Editor, name: str, label: str = "", width: float = -1.0) -> None:
+def command_button(
+    editor: Editor, name: str, label: str = "", width: float = -1.0, icon: str = ""
+) -> None:
     """It says `label`, else the command's name; `width` in points, -1 fills.
 
     Where the command cannot run it is greyed out, and the reason is its tooltip.
     """
     shown = label or t(COMMANDS[name].label)
-    if button(shown, why_not=why_not(editor, name), width=width):
+    if button(f"{icon}  {shown}" if icon else shown, why_not=why_not(editor, name), width=width):
+        run(editor, name)
+
+
+def command_icon(
+    editor: Editor, name: str, icon: str, side: float = FIELD, is_above: bool = False
+) -> None:
+    """A command as an icon; what it is called, and its keys, are its tooltip."""
+    if icon_button(icon, name, hint_of(editor, name), why_not(editor, name), side, is_above):
         run(editor, name)
 
 
