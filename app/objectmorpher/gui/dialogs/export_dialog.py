@@ -22,6 +22,7 @@ from ..widgets.widgets import (
     shortened,
     shown_path,
     tooltip,
+    wrapped_text,
 )
 from ..window.landmarks import mark
 
@@ -161,11 +162,7 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     imgui.dummy(theme.size(0, 4))
     warning = t("{name} already exists.", name=exporting.path.name)
     text = problem or (warning if exporting.is_replacing else exporting.renaming)
-    imgui.push_style_color(imgui.Col_.text, theme.vec("warning"))
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(text or " ")
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()
+    wrapped_text(text or " ", "warning")
     top = imgui.get_cursor_pos_y()
     imgui.set_cursor_pos_y(top + theme.pt((PRIMARY - FIELD) / 2))
     is_cancelled = button(t("Cancel"), width=BROWSE)

@@ -29,6 +29,7 @@ from ..widgets.widgets import (
     note,
     rule,
     tooltip,
+    wrapped_text,
 )
 
 if TYPE_CHECKING:
@@ -99,9 +100,7 @@ def _row(id: str, name: str) -> Iterator[None]:
 
 def _draw_gain(text: str) -> None:
     """What the row's model is good for, left of the buttons."""
-    imgui.push_text_wrap_pos(imgui.get_window_width() - theme.pt(20 + BUTTON + 16))
-    imgui.text_unformatted(text)
-    imgui.pop_text_wrap_pos()
+    wrapped_text(text, end=imgui.get_window_width() - theme.pt(20 + BUTTON + 16))
 
 
 def _draw_set(editor: Editor, offer: SetOffer) -> None:

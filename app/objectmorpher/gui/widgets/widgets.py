@@ -98,9 +98,7 @@ def tooltip(text: str, is_above: bool = False) -> None:
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(*TIP_PADDING))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(RADIUS))
         imgui.begin_tooltip()
-        imgui.push_text_wrap_pos(theme.pt(TIP_WIDTH))
-        imgui.text_unformatted(text)
-        imgui.pop_text_wrap_pos()
+        wrapped_text(text, end=theme.pt(TIP_WIDTH))
         low, size = imgui.get_window_pos(), imgui.get_window_size()
         mark_on_canvas("Tooltip", low, ImVec2(low.x + size.x, low.y + size.y))
         imgui.end_tooltip()
@@ -270,12 +268,15 @@ def heading(text: str) -> None:
 
 def note(text: str) -> None:
     """Secondary text, wrapped."""
-    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(text)
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()
+    wrapped_text(text, "secondary")
     sought.meet(text, has_field=False)
+
+
+def wrapped_text(text: str, role: str = "text", end: float = 0.0) -> None:
+    """`end`: where its lines end, window units; 0 at the window's edge."""
+    imgui.push_text_wrap_pos(end)
+    imgui.text_colored(theme.vec(role), text)
+    imgui.pop_text_wrap_pos()
 
 
 def gap(points: float) -> None:

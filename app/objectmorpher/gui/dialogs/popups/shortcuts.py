@@ -13,7 +13,7 @@ from ....editor.shortcuts import GESTURES, Shortcuts
 from ....system.texts import t
 from ...widgets.modal import popup
 from ...widgets.theme import SMALL_SIZE, Icon, theme
-from ...widgets.widgets import Emphasis, bold_text, button, small_text, tooltip
+from ...widgets.widgets import Emphasis, bold_text, button, small_text, tooltip, wrapped_text
 
 SIZE = (880.0, 720.0)  # points
 COLUMNS = 2
@@ -124,8 +124,4 @@ def _draw_gesture(gesture: str, meaning: str) -> None:
         imgui.text_unformatted(t(gesture))
     imgui.same_line()
     imgui.set_cursor_pos_x(start + GESTURE * width)
-    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-    imgui.push_text_wrap_pos(start + width - theme.pt(12))
-    imgui.text_unformatted(t(meaning))
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()
+    wrapped_text(t(meaning), "secondary", start + width - theme.pt(12))
