@@ -113,8 +113,7 @@ def _cannot_refine(editor: Editor) -> str | None:
         return t("The edit is being refined")
     if (reason := nothing_lifted(editor)) is not None:
         return reason
-    assert editor.document is not None
-    if not any(item.is_moved for item in editor.document.objects):
+    if not any(item.is_moved for item in editor.opened.objects):
         return t("Move the object first")
     if (trouble := editor.composing.trouble) is not None:
         return trouble

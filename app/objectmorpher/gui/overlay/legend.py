@@ -77,8 +77,7 @@ class Legend:
     # Rows
 
     def _draw_depth(self) -> None:
-        document = self._editor.document
-        assert document is not None
+        document = self._editor.opened
         half = self._editor.cache.painter.spread(document).half
         self._bar(DEPTH_STOPS)
         self._text(t("near  −{half}", half=f"{half:.2f}"), WHITE)

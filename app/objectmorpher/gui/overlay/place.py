@@ -154,8 +154,7 @@ def _draw_trust(canvas: CanvasPainter, x: float, y: float) -> None:
     from objectmorpher_core.raster.trust import trust_in
 
     editor = canvas.editor
-    assert editor.document is not None, "its object is being turned"
-    sign = trust_in(editor.derived.draft(editor.document, editor.current)).sign
+    sign = trust_in(editor.derived.draft(editor.opened, editor.current)).sign
     words = {"fine": t("Fine"), "look closely": t("Look closely"), "guesswork": t("Guesswork")}
     canvas.label(words[sign], x, y, dot=TRUST[sign])
 

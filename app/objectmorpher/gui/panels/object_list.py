@@ -172,8 +172,7 @@ def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
         return False
     if drawn_button(f"##object{k}", size) and not _is_dragged:
         editor.objects.choose(k)
-    assert editor.document is not None
-    mark(f"row of {editor.document.objects[k].name}")
+    mark(f"row of {editor.opened.objects[k].name}")
     if imgui.is_item_active() and imgui.is_mouse_dragging(0, theme.pt(SLACK)) and not _is_dragged:
         _is_dragged = editor.objects.carry(k)
     is_hovered = imgui.is_item_hovered()
@@ -192,9 +191,8 @@ def _draw_name(name: str, is_visible: bool, at: ImVec2, end: ImVec2) -> None:
 
 def _draw_field(editor: Editor, k: int, start: ImVec2, width: float) -> None:
     """Enter or a click elsewhere takes the name, Esc leaves the old one."""
-    assert editor.document is not None
     if _typing.of != k:
-        _typing.of, _typing.text = k, editor.document.objects[k].name
+        _typing.of, _typing.text = k, editor.opened.objects[k].name
         _typing.has_focus = False
     if not _typing.has_focus and not imgui.is_mouse_down(0):
         imgui.set_keyboard_focus_here()
