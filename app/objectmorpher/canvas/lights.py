@@ -167,9 +167,7 @@ class Lights:
                 continue
             kept = self._kept[k]
             x0, y0, x1, y1 = look.shade.bounds
-            low = view.canvas_from_image(np.array([x0, y0]))
-            high = view.canvas_from_image(np.array([x1, y1]))
-            box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+            box = view.canvas_box((x0, y0), (x1, y1))
             if kept.shade is None or kept.shade.box != box:
                 shade = look.shade
                 rgba = kept.shade.rgba if kept.shade else _inked(shade.alpha, shade.colour)

@@ -6,7 +6,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -48,7 +48,6 @@ from .terminal import PROGRAM, UsageError, progress_bar
 
 
 def run_doctor(options: argparse.Namespace) -> None:
-    """`objectmorpher doctor [--json]`"""
     from objectmorpher_core import doctor, models
     from objectmorpher_core.base import installation
 
@@ -113,7 +112,6 @@ LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
 
 def run_edit(options: argparse.Namespace) -> None:
-    """`objectmorpher edit`"""
     items = _items(options)
     _compile_beside()
     scripts = [s for i in items for s in (i.script, *(o.script for o in i.others.objects))]
@@ -216,7 +214,6 @@ def _endings(what: str) -> tuple[str, ...]:
 
 
 def run_select(options: argparse.Namespace) -> None:
-    """`objectmorpher select`"""
     script = _script(options)
     inputs = [options.photo, *([Path(script.mask)] if script.mask else [])]
     check_outputs(inputs, {options.out: (".png",)})
@@ -249,14 +246,17 @@ def _how_sure(sure: float | None) -> str:
 
 
 def run_replay(options: argparse.Namespace) -> None:
-    """`objectmorpher replay`"""
     from objectmorpher_core.scripting.handle_file import encode_handles, with_handles
     from objectmorpher_core.session.file import encode_session, load_session
 
-    wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
-    further = (options.report, options.save_handles, options.save_mesh, options.save_session)
-    kinds = ((".json",), (".json",), OUTPUTS["mesh"], (".omorph",))
-    wanted |= {path: kind for path, kind in zip(further, kinds, strict=True) if path}
+    further: tuple[tuple[Path | None, tuple[str, ...], Callable[[Edited], bytes]], ...] = (
+        (options.out, ENDINGS, lambda e: encode_picture(e.picture, options.out.suffix)),
+        (options.save_handles, (".json",), lambda e: encode_handles(e.document)),
+        (options.save_mesh, OUTPUTS["mesh"], lambda e: encode_output("mesh", e, options.save_mesh)),
+        (options.save_session, (".omorph",), lambda e: encode_session(e.document)),
+        (options.report, (".json",), lambda e: json_bytes(e.report())),
+    )
+    wanted = {path: endings for path, endings, _ in further if path}
     refuse_idle("replay", said_on(options, options.parser))
     video, clip = options.save_video, _clip(options)
     if video and _is_folder("save_video", video):
@@ -265,28 +265,18 @@ def run_replay(options: argparse.Namespace) -> None:
         wanted[video] = _endings("video")
     inputs = [options.session, *([options.handles] if options.handles else [])]
     check_outputs(inputs, wanted)
-    _check_distinct(path for path in (options.out, *further, video) if path)
+    _check_distinct(path for path in (*(path for path, _, _ in further), video) if path)
     with progress_bar("Opening") as progress:
         document = load_session(options.session)
         if options.handles:
             document = with_handles(document, read_input(options.handles))
         edited = replay(document, progress)
-        outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
-        if video:
-            outputs |= _encoded("save_video", edited, video, clip)
-        if options.save_handles:
-            outputs[options.save_handles] = encode_handles(edited.document)
-        if options.save_mesh:
-            outputs[options.save_mesh] = encode_output("mesh", edited, options.save_mesh)
-        if options.save_session:
-            outputs[options.save_session] = encode_session(edited.document)
-        if options.report:
-            outputs[options.report] = json_bytes(edited.report())
+        outputs = _encoded("save_video", edited, video, clip) if video else {}
+        outputs |= {path: encode(edited) for path, _, encode in further if path}
     write_all(outputs)
 
 
 def run_info(options: argparse.Namespace) -> None:
-    """`objectmorpher info`"""
     from objectmorpher_core.session.file import load_session
 
     info = describe(load_session(options.session))
@@ -340,7 +330,6 @@ def describe(document: Document) -> dict[str, Any]:
 
 
 def run_convert(options: argparse.Namespace) -> None:
-    """`objectmorpher convert`"""
     refuse_idle("convert", said_on(options, options.parser))
     count = COUNT if options.count is None else options.count
     if not LEAST_COUNT <= count <= MOST_COUNT:
@@ -366,7 +355,6 @@ def _object_of(session: Path, what: str, out: Path, progress: Progress) -> bytes
 
 
 def run_warm_up(options: argparse.Namespace) -> None:
-    """`objectmorpher warm-up`"""
     from ..system.warm_up import compile_kernels
 
     compile_kernels()
@@ -462,7 +450,6 @@ def _line(value: Any) -> str:
 
 
 def run_share(options: argparse.Namespace) -> None:
-    """`objectmorpher share`"""
     from objectmorpher_core.session.file import load_session
 
     from ..server.share_page import encode_page

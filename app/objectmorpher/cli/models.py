@@ -20,7 +20,6 @@ THERE = {"ok": "installed", "missing": "not installed", "damaged": "damaged"}
 
 
 def run_models(options: argparse.Namespace) -> None:
-    """`objectmorpher models list|get|path|verify|add|remove|setup`"""
     action, id = options.action, options.id
     if (action == "add") != (options.file is not None):
         raise UsageError(
@@ -45,16 +44,16 @@ def run_models(options: argparse.Namespace) -> None:
 def _add(id: str, source: Path, is_converted: bool) -> None:
     if is_converted:
         with progress_bar(f"Converting {source.name}") as progress:
-            _write(_line_of_hub("list", models.convert_folder(id, source, progress)))
+            _write(_line_of_hub(models.convert_folder(id, source, progress)))
         return
     if id in {kind.id for kind in models.KINDS}:
-        _write(_line_of_added("list", models.add(id, source)))
+        _write(_line_of_added(models.add(id, source)))
         return
     known = (*models.families(), *(model.id for model in models.hub_models()))
     if id not in known:
         names = ", ".join((*(kind.id for kind in models.KINDS), *known))
         raise UsageError(f"nothing can be added as {id!r}; known are {names}")
-    _write(_line_of_hub("list", models.use_folder(id, source)))
+    _write(_line_of_hub(models.use_folder(id, source)))
 
 
 def _remove(id: str) -> None:
@@ -173,45 +172,52 @@ def _look(action: str, id: str | None) -> None:
     workers = tuple(name for name in worker_file.worker_names() if id in (None, name))
     others = {known.id for known in (*models.KINDS, *models.hub_models())}
     is_worker = id is not None and bool(workers)
-    states = () if id in others or is_worker else _states(action, id)
+    check = models.verify if action == "verify" else models.look
+    states = () if id in others or is_worker else check(id)
     brought = tuple(models.added(kind.id) for kind in models.KINDS if id in (None, kind.id))
     look = models.verify_hub if action == "verify" else models.look_hub
     several = tuple(look(model.id) for model in models.hub_models() if id in (None, model.id))
     if action != "list" and id is None:  # what nobody has got is only listed
         several = tuple(state for state in several if state.state != "missing")
         states = tuple(s for s in states if s.weight.category == "edit" or s.state != "missing")
-    for state in states:
-        _write(_line_of(action, state))
-    for own in brought:
-        _write(_line_of_added(action, own))
-    for found in several:
-        _write(_line_of_hub(action, found))
-    for name in workers if action == "list" else ():
-        _write(_line_of_worker(name))
-    # What only a user can bring is not missed, unless it is asked for.
-    broken = [state.weight.id for state in states if state.state != "ok"]
-    broken += [b.kind.id for b in brought if b.state == "damaged" or (id and b.state != "ok")]
-    broken += [found.model.id for found in several if found.state != "ok"]
-    if broken and action != "list":
+    if action == "list":
+        lines = [
+            *map(_line_of, states), *map(_line_of_added, brought),
+            *map(_line_of_hub, several), *map(_line_of_worker, workers),
+        ]  # fmt: skip
+        _write("\n".join(lines))
+        return
+    broken = []
+    for found in (*states, *brought, *several):
+        name = _name_of(found)
+        if action == "verify":
+            reason = getattr(found, "reason", "")  # why it is damaged
+            _write(f"{name}: {found.state}{f' ({reason})' if reason else ''}")
+        elif found.state == "ok":
+            _write(str(found.path))
+        # What only a user can bring is not missed, unless it is asked for.
+        is_optional = isinstance(found, Added) and found.state == "missing" and not id
+        broken += [name] if found.state != "ok" and not is_optional else []
+    if broken:
         raise UsageError(f"{', '.join(broken)}: not installed or damaged, see `models list`")
 
 
-def _states(action: str, id: str | None) -> tuple[CacheState, ...]:
-    return models.verify(id) if action == "verify" else models.look(id)
+def _name_of(found: CacheState | TrunkState | Added | HubState) -> str:
+    if isinstance(found, CacheState):
+        return found.weight.id
+    if isinstance(found, TrunkState):
+        return found.trunk.id
+    return found.kind.id if isinstance(found, Added) else found.model.id
 
 
-def _line_of(action: str, state: CacheState) -> str:
+def _line_of(state: CacheState) -> str:
     weight = state.weight
-    if action != "list":
-        return _checked(action, weight.id, state)
     there = "installed" if state.state == "ok" else "not installed"
     return _columns(weight.id, _size(weight.size), weight.licence, there, weight.purpose)
 
 
-def _line_of_hub(action: str, found: HubState) -> str:
+def _line_of_hub(found: HubState) -> str:
     model = found.model
-    if action != "list":
-        return _checked(action, model.id, found, found.reason)
     there, purpose = THERE[found.state], model.purpose
     if found.is_own:
         there, purpose = "yours" if found.state == "ok" else there, f"{purpose} ({found.path})"
@@ -221,23 +227,14 @@ def _line_of_hub(action: str, found: HubState) -> str:
     return _columns(model.id, _size(model.size), licence, there, purpose)
 
 
-def _line_of_added(action: str, own: Added) -> str:
+def _line_of_added(own: Added) -> str:
     """Which of the user's files it is, or which it could be."""
     kind = own.kind
-    if action != "list":
-        return _checked(action, kind.id, own)
     if own.state == "ok":
         told = f"{kind.purpose} ({own.name}, sha256 {own.sha256})"
         return _columns(kind.id, _size(own.size), "yours", THERE["ok"], told)
     told = f"{kind.purpose}; models add {kind.id} FILE, {kind.example}"
     return _columns(kind.id, "", "yours", THERE[own.state], told)
-
-
-def _checked(action: str, id: str, found: CacheState | HubState | Added, reason: str = "") -> str:
-    """What `verify` and `path` say; `reason`: why it is damaged."""
-    if action == "verify":
-        return f"{id}: {found.state}{f' ({reason})' if reason else ''}"
-    return str(found.path) if found.state == "ok" else ""
 
 
 def _line_of_worker(name: str) -> str:

@@ -303,7 +303,6 @@ def _add_completion(parser: argparse.ArgumentParser) -> None:
 
 
 def run_completion(options: argparse.Namespace) -> None:
-    """`objectmorpher completion`"""
     import shtab
 
     sys.stdout.write(shtab.complete(completed_files(build_parser()), options.shell))
@@ -383,12 +382,17 @@ def _list(least: int, most: int) -> Callable[[str], tuple[float, ...]]:
     return parse
 
 
-def _handle(text: str) -> dict[str, Any]:
-    at, colon, to = text.partition(":")
+def _from_to(text: str, third: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Two places; the second may have a `third` number."""
+    start, colon, end = text.partition(":")
     if not colon:
-        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,DZ")
-    target = _list(2, 3)(to)
-    return {"at": _list(2, 2)(at), "to": target[:2], "dz": target[2] if target[2:] else 0.0}
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,{third}")
+    return _list(2, 2)(start), _list(2, 3)(end)
+
+
+def _handle(text: str) -> dict[str, Any]:
+    at, target = _from_to(text, "DZ")
+    return {"at": at, "to": target[:2], "dz": target[2] if target[2:] else 0.0}
 
 
 def _key(text: str) -> dict[str, Any]:
@@ -411,12 +415,9 @@ def _key(text: str) -> dict[str, Any]:
 
 
 def _fill_from(text: str) -> dict[str, Any]:
-    source, colon, to = text.partition(":")
-    if not colon:
-        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,R")
-    target = _list(2, 3)(to)
+    source, target = _from_to(text, "R")
     radius = {"radius": target[2]} if target[2:] else {}
-    return {"source": _list(2, 2)(source), "to": target[:2], **radius}
+    return {"source": source, "to": target[:2], **radius}
 
 
 def _more_view(text: str) -> dict[str, Any]:
@@ -428,10 +429,10 @@ def _more_view(text: str) -> dict[str, Any]:
 
 
 def _command(
-    name: str, help: str, add_options: Callable[[argparse.ArgumentParser], None]
-) -> Subcommand:
-    run = lazily("commands", f"run_{name.replace('-', '_')}")
-    return Subcommand(name, help, add_options, run)
+    name: str, help: str, add_options: Callable[[argparse.ArgumentParser], None],
+    module: str = "commands",
+) -> Subcommand:  # fmt: skip
+    return Subcommand(name, help, add_options, lazily(module, f"run_{name.replace('-', '_')}"))
 
 
 def _on_photo(
@@ -453,35 +454,23 @@ def _on_photo(
 
 SUBCOMMANDS = (
     _on_photo("edit", "edit a photo without a window", _add_edit),
-    Subcommand(
-        "batch", "run many edit scripts", _add_batch,
-        lazily("batch", "run_batch"),
-    ),
+    _command("batch", "run many edit scripts", _add_batch, "batch"),
     _on_photo("select", "write the mask of the chosen object", _add_select),
     _command("replay", "render a saved session again", _add_replay),
     _command("info", "show what a session holds", _add_info),
     _command("convert", "convert splat and mesh files", _add_convert),
-    Subcommand("share", "make a web page in which the object can be dragged", _add_share,
-               lazily("commands", "run_share")),
-    Subcommand(
-        "models", "list, get and check learned weights", _add_models,
-        lazily("models", "run_models"),
-    ),
-    Subcommand(
-        "doctor", "show what runs on this machine, and what would help", _add_doctor,
-        lazily("commands", "run_doctor"),
-    ),
-    Subcommand(
+    _command("share", "make a web page in which the object can be dragged", _add_share),
+    _command("models", "list, get and check learned weights", _add_models, "models"),
+    _command("doctor", "show what runs on this machine, and what would help", _add_doctor),
+    _command(
         "plugin", "install the plug-in for Krita, GIMP or ComfyUI",
-        lazily("plugin", "add_plugin"), lazily("plugin", "run_plugin"),
+        lazily("plugin", "add_plugin"), "plugin",
     ),
     _command("warm-up", "compile the kernels in advance", _add_warm_up),
     Subcommand(
         "completion", "print a completion script for your shell", _add_completion, run_completion
     ),
-    Subcommand(
-        "serve", "run the long jobs for other computers", lazily("serve", "add_serve"),
-        lazily("serve", "run_serve"),
-    ),
+    _command("serve", "run the long jobs for other computers", lazily("serve", "add_serve"),
+             "serve"),
 )  # fmt: skip
 COMMANDS = (*(subcommand.name for subcommand in SUBCOMMANDS), *RESEARCH)

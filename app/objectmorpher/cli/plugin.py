@@ -41,7 +41,6 @@ def add_plugin(parser: argparse.ArgumentParser) -> None:
 
 
 def run_plugin(options: argparse.Namespace) -> None:
-    """`objectmorpher plugin`"""
     host: str = options.host
     folder = options.folder or usual_folder(host)
     if folder is None:

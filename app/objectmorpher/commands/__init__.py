@@ -106,7 +106,7 @@ OTHER_WORDS = {
 }  # fmt: skip
 
 __all__ = [
-    "COMMANDS", "GROUPS", "OTHER_WORDS", "Command", "keys_of", "next_step", "run",
+    "COMMANDS", "GROUPS", "OTHER_WORDS", "Command", "hint_of", "keys_of", "next_step", "run",
     "take_next_step", "why_not",
 ]  # fmt: skip
 
@@ -144,6 +144,12 @@ def run(editor: Editor, name: str) -> None:
 def keys_of(editor: Editor, name: str) -> str:
     """The keys that run a command: the user's own, or the usual ones; "" for none."""
     return editor.settings.shortcuts.get(name, COMMANDS[name].keys)
+
+
+def hint_of(editor: Editor, name: str) -> str:
+    """What a command is called, and the keys that run it."""
+    keys = keys_of(editor, name)
+    return t(COMMANDS[name].label) + (f" ({keys})" if keys else "")
 
 
 def take_next_step(editor: Editor) -> None:

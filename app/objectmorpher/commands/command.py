@@ -22,25 +22,30 @@ def no_photo(editor: Editor) -> str | None:
     return None if editor.document else t("Open a photo first")
 
 
-def no_selection(editor: Editor) -> str | None:
-    if editor.mask is None:
-        return no_photo(editor) or t("Click an object in the photo first")
-    return None
+def unless(
+    is_met: Callable[[Editor], object], reason: Callable[[Editor], str], first: Reason
+) -> Reason:
+    """What `first` has against a command; if that is nothing, the `reason`, unless `is_met`."""
+
+    def why_not(editor: Editor) -> str | None:
+        return first(editor) or (None if is_met(editor) else reason(editor))
+
+    return why_not
 
 
-def no_lift(editor: Editor) -> str | None:
-    return None if editor.is_lifted else no_photo(editor) or editor.why_no_shape
+no_selection = unless(
+    lambda e: e.mask is not None, lambda e: t("Click an object in the photo first"), no_photo
+)
+no_lift = unless(lambda e: e.is_lifted, lambda e: e.why_no_shape, no_photo)
+no_handle = unless(
+    lambda e: e.posing.handle is not None, lambda e: t("Select a handle first"), no_lift
+)
 
 
 def nothing_lifted(editor: Editor) -> str | None:
     document = editor.document
     is_there = document is not None and any(o.lifted for o in document.objects)
     return None if is_there else no_photo(editor) or editor.why_no_shape
-
-
-def no_handle(editor: Editor) -> str | None:
-    is_chosen = editor.posing.handle is not None
-    return no_lift(editor) or (None if is_chosen else t("Select a handle first"))
 
 
 def cannot_lift(editor: Editor) -> str | None:

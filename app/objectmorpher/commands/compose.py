@@ -11,7 +11,7 @@ from ..editor.intents.refining import REFINE
 from ..editor.tasks import PLATE
 from ..editor.view import Composed, ToolName
 from ..system.texts import sentence, t
-from .command import Command, no_lift, nothing_lifted
+from .command import Command, no_lift, nothing_lifted, unless
 
 
 def _toggle_bare(editor: Editor) -> None:
@@ -36,16 +36,30 @@ def _is_painting(editor: Editor) -> bool:
     return editor.view.tool is ToolName.COMPOSE and editor.view.compose.is_painting
 
 
-def _cannot_paint(editor: Editor) -> str | None:
-    if (reason := no_lift(editor)) is not None:
-        return reason
-    is_shown = editor.object is not None and editor.object.is_visible
-    return None if is_shown else t("The object is hidden")
-
-
-def _not_painted(editor: Editor) -> str | None:
-    is_painted = editor.object is not None and editor.object.is_painted
-    return no_lift(editor) or (None if is_painted else t("Nothing is painted on the object"))
+_cannot_paint = unless(
+    lambda e: e.object is not None and e.object.is_visible,
+    lambda e: t("The object is hidden"),
+    no_lift,
+)
+_not_painted = unless(
+    lambda e: e.object is not None and e.object.is_painted,
+    lambda e: t("Nothing is painted on the object"),
+    no_lift,
+)
+# Shadow and light are of objects that have moved: the photo has those of the others.
+not_moved = unless(
+    lambda e: e.object is not None and e.object.is_moved,
+    lambda e: t("Move the object first"),
+    no_lift,
+)
+_no_sources = unless(
+    lambda e: e.hinting.shown, lambda e: t("No fill source has been set"), nothing_lifted
+)
+_not_refined = unless(
+    lambda e: e.refining.refined is not None,
+    lambda e: t("The edit is not refined"),
+    nothing_lifted,
+)
 
 
 def _toggle_taking(editor: Editor) -> None:
@@ -58,12 +72,6 @@ def _toggle_taking(editor: Editor) -> None:
 
 def _is_taking(editor: Editor) -> bool:
     return _is_bare(editor) and editor.view.compose.drag is Composed.TAKE
-
-
-def _no_sources(editor: Editor) -> str | None:
-    return nothing_lifted(editor) or (
-        None if editor.hinting.shown else t("No fill source has been set")
-    )
 
 
 def _cannot_fill(editor: Editor) -> str | None:
@@ -92,14 +100,6 @@ def _cannot_vary(editor: Editor) -> str | None:
     return nothing_lifted(editor)
 
 
-def not_moved(editor: Editor) -> str | None:
-    """Shadow and light are of objects that have moved: the photo has those of the others."""
-    if (reason := no_lift(editor)) is not None:
-        return reason
-    is_moved = editor.object is not None and editor.object.is_moved
-    return None if is_moved else t("Move the object first")
-
-
 def _cannot_take(editor: Editor) -> str | None:
     if editor.jobs.is_busy(SHADOW):
         return t("Its shadow is being looked for")
@@ -113,8 +113,7 @@ def _cannot_refine(editor: Editor) -> str | None:
         return t("The edit is being refined")
     if (reason := nothing_lifted(editor)) is not None:
         return reason
-    assert editor.document is not None
-    if not any(item.is_moved for item in editor.document.objects):
+    if not any(item.is_moved for item in editor.opened.objects):
         return t("Move the object first")
     if (trouble := editor.composing.trouble) is not None:
         return trouble
@@ -122,15 +121,6 @@ def _cannot_refine(editor: Editor) -> str | None:
         return t("Looking at what can run here")
     reason = editor.methods.why_not("refine")
     return None if reason is None else sentence(reason)
-
-
-def _not_refined(editor: Editor) -> str | None:
-    is_refined = editor.refining.refined is not None
-    return nothing_lifted(editor) or (None if is_refined else t("The edit is not refined"))
-
-
-def _falls_on_depth(editor: Editor) -> bool:
-    return editor.document is not None and editor.document.depth is not None
 
 
 def _cannot_look(editor: Editor) -> str | None:
@@ -175,6 +165,6 @@ COMMANDS: dict[str, Command] = {
     ),
     "depth": Command(
         "Shadows fall on walls and steps", "", lambda e: e.composing.toggle_depth(),
-        _cannot_look, _falls_on_depth,
+        _cannot_look, lambda e: e.document is not None and e.document.depth is not None,
     ),
 }  # fmt: skip

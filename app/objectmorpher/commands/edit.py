@@ -20,6 +20,7 @@ from .command import (
     no_selection,
     no_undo,
     nothing_lifted,
+    unless,
 )
 
 # Panels and dialogs.
@@ -47,8 +48,7 @@ def _nothing_open(editor: Editor) -> str | None:
     return None if len(editor.tabs.all) > 1 else no_photo(editor)
 
 
-def _no_other_tab(editor: Editor) -> str | None:
-    return None if len(editor.tabs.all) > 1 else t("No other photo is open")
+_no_other_tab = unless(lambda e: len(e.tabs.all) > 1, lambda e: t("No other photo is open"), never)
 
 
 FILE_COMMANDS: dict[str, Command] = {
@@ -86,9 +86,9 @@ def _copy_object(editor: Editor) -> None:
     editor.exporting.copy(What.CUTOUT)
 
 
-def _nothing_copied(editor: Editor) -> str | None:
-    has_any = editor.pasting.has_copied
-    return no_photo(editor) or (None if has_any else t("Lift an object and copy it first"))
+_nothing_copied = unless(
+    lambda e: e.pasting.has_copied, lambda e: t("Lift an object and copy it first"), no_photo
+)
 
 
 COMMANDS: dict[str, Command] = {
@@ -139,9 +139,9 @@ def _split(editor: Editor) -> None:
     editor.view.split = 0.5 if editor.view.split is None else None
 
 
-def _not_turned(editor: Editor) -> str | None:
-    is_turned = editor.looking.orbit is not None
-    return None if is_turned else no_lift(editor) or t("The photo's own view is shown")
+_not_turned = unless(
+    lambda e: e.looking.orbit is not None, lambda e: t("The photo's own view is shown"), no_lift
+)
 
 
 def _points(editor: Editor) -> None:

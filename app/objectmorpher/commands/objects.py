@@ -20,44 +20,28 @@ from .command import (
     no_lift,
     no_photo,
     no_selection,
+    unless,
 )
 
 FAR = 1000  # places: past all others
-
-
-def _no_object(editor: Editor) -> str | None:
-    is_there = editor.object is not None and editor.mask is not None
-    return None if is_there else no_photo(editor) or t("Click an object in the photo first")
 
 
 def _raise(label: str, keys: str, steps: int) -> Command:
     def run(editor: Editor) -> None:
         editor.objects.raise_by(steps, t(label))
 
-    return Command(label, keys, run, _cannot_raise(steps))
-
-
-def _cannot_raise(steps: int) -> Reason:
-    return lambda editor: no_photo(editor) or editor.objects.why_not_raise(steps)
-
-
-def _cannot_add(editor: Editor) -> str | None:
-    return None if _stays(editor) else no_lift(editor)
+    return Command(label, keys, run, lambda e: no_photo(e) or e.objects.why_not_raise(steps))
 
 
 def _cannot_keep(editor: Editor) -> str | None:
     if editor.jobs.is_busy(SELECT):
         return t("The selection is not ready yet")
     is_moved = editor.object is not None and editor.object.is_moved
-    return _no_object(editor) or (t("It has moved") if is_moved else None)
+    return no_selection(editor) or (t("It has moved") if is_moved else None)
 
 
 def _stays(editor: Editor) -> bool:
     return editor.object is not None and editor.object.stays_in_front
-
-
-def _is_locked(editor: Editor) -> bool:
-    return editor.object is not None and editor.object.is_locked
 
 
 def _rename(editor: Editor) -> None:
@@ -65,14 +49,23 @@ def _rename(editor: Editor) -> None:
 
 
 COMMANDS: dict[str, Command] = {
-    "another": Command("Another object", "", lambda e: e.objects.start_another(), _cannot_add),
-    "rename": Command("Rename object", "", _rename, _no_object),
+    "another": Command(
+        "Another object",
+        "",
+        lambda e: e.objects.start_another(),
+        lambda e: None if _stays(e) else no_lift(e),
+    ),
+    "rename": Command("Rename object", "", _rename, no_selection),
     "duplicate": Command("Duplicate object", "Ctrl+J", lambda e: e.objects.duplicate(), no_lift),
     "remove_object": Command(
-        "Remove object", "Shift+Delete", lambda e: e.objects.remove(), _no_object
+        "Remove object", "Shift+Delete", lambda e: e.objects.remove(), no_selection
     ),
     "lock": Command(
-        "Lock object", "Ctrl+Alt+L", lambda e: e.lock(e.current), _no_object, _is_locked
+        "Lock object",
+        "Ctrl+Alt+L",
+        lambda e: e.lock(e.current),
+        no_selection,
+        lambda e: e.object is not None and e.object.is_locked,
     ),
     "keep_in_front": Command(
         "Keep in front", "", lambda e: e.objects.toggle_front(), _cannot_keep, _stays
@@ -84,28 +77,19 @@ COMMANDS: dict[str, Command] = {
 }
 
 
-def _where_it_was() -> str:
+def _where_it_was(editor: Editor) -> str:
     return t("The object is where it was in the photo")
 
 
-def _unless(
-    is_reset: Callable[[Placement], bool], reason: Callable[[], str]
-) -> Callable[[Editor], str | None]:
-    """The reason why what is reset already cannot be reset."""
-
-    def why_not(editor: Editor) -> str | None:
-        placement = editor.placing.placement
-        if placement is None:
-            return no_lift(editor)
-        return reason() if is_reset(placement) else None
-
-    return why_not
+def _reset(is_changed: Callable[[Placement], object], reason: Callable[[Editor], str]) -> Reason:
+    """The reason why what is as it was already cannot be reset."""
+    return unless(lambda e: (p := e.placing.placement) and is_changed(p), reason, no_lift)
 
 
-_not_moved = _unless(lambda place: place.is_identity, _where_it_was)
-_not_shifted = _unless(lambda place: place.move == (0.0, 0.0) and place.depth == 0, _where_it_was)
-_not_turned = _unless(lambda place: not any(place.turn), lambda: t("The object is not turned"))
-_not_sized = _unless(lambda place: place.scale == 1, lambda: t("The object has its own size"))
+_not_moved = _reset(lambda place: not place.is_identity, _where_it_was)
+_not_shifted = _reset(lambda place: any((*place.move, place.depth)), _where_it_was)
+_not_turned = _reset(lambda place: any(place.turn), lambda e: t("The object is not turned"))
+_not_sized = _reset(lambda place: place.scale != 1, lambda e: t("The object has its own size"))
 
 
 PLACE_COMMANDS: dict[str, Command] = {
@@ -131,25 +115,19 @@ PLACE_COMMANDS: dict[str, Command] = {
 # The selection, its edge, its file, and lifting what is selected.
 
 
-def _no_soft_edge(editor: Editor) -> str | None:
-    is_soft = editor.masking.is_soft
-    return no_selection(editor) or (
-        None if is_soft else t("The edge is found in the photo already")
-    )
-
-
-def _nothing_left_out(editor: Editor) -> str | None:
-    is_any = bool(editor.leaving_out.pieces)
-    return no_lift(editor) or (None if is_any else t("Nothing beside it looks like a part of it"))
-
-
-def _no_photo_more(editor: Editor) -> str | None:
-    return no_lift(editor) or editor.shaping.why_no_photo
-
-
-def _not_a_file(editor: Editor) -> str | None:
-    is_file = editor.shaping.why_fixed is not None
-    return no_lift(editor) or (None if is_file else t("It was lifted from this photo"))
+_no_soft_edge = unless(
+    lambda e: e.masking.is_soft, lambda e: t("The edge is found in the photo already"), no_selection
+)
+_nothing_left_out = unless(
+    lambda e: e.leaving_out.pieces,
+    lambda e: t("Nothing beside it looks like a part of it"),
+    no_lift,
+)
+_not_a_file = unless(
+    lambda e: e.shaping.why_fixed is not None,
+    lambda e: t("It was lifted from this photo"),
+    no_lift,
+)
 
 
 def _nothing_painted(editor: Editor) -> str | None:
@@ -200,7 +178,10 @@ SELECT_COMMANDS: dict[str, Command] = {
     "lift": Command("Lift object", "Ctrl+L", lambda e: e.tasks.lift(), cannot_lift),
     "import_shape": Command("Use a 3D file…", "", asks_for(Dialog.SHAPE_OPEN), no_selection),
     "add_photo": Command(
-        "Add a photo from another side…", "", asks_for(Dialog.VIEW_OPEN), _no_photo_more
+        "Add a photo from another side…",
+        "",
+        asks_for(Dialog.VIEW_OPEN),
+        lambda e: no_lift(e) or e.shaping.why_no_photo,
     ),
     "fit_again": Command("Fit to the photo", "", lambda e: e.shaping.fit_again(), _not_a_file),
     "clear_painted": Command(
@@ -212,15 +193,25 @@ SELECT_COMMANDS: dict[str, Command] = {
 # Handles and what holds the object.
 
 
-def no_handles(editor: Editor) -> str | None:
-    """Return the reason why a command for all handles cannot run: there are none."""
-    is_there = editor.object is not None and editor.object.handles
-    return no_lift(editor) or (None if is_there else t("There is no handle yet"))
+_no_handles = unless(
+    lambda e: e.object is not None and e.object.handles,
+    lambda e: t("There is no handle yet"),
+    no_lift,
+)
+_no_place_for_a_pin = unless(
+    lambda e: e.hover.surface is not None or e.hover.handle is not None,
+    lambda e: t("Point at the object to pin it there"),
+    no_lift,
+)
+_no_key = unless(lambda e: e.keying.count > 0, lambda e: t("There is no key pose yet"), no_lift)
+_nothing_to_replace = unless(
+    lambda e: e.keying.shown is None, lambda e: t("Nothing has changed since"), _no_key
+)
 
 
 def _no_pose(editor: Editor) -> str | None:
     is_posed = editor.object is not None and editor.object.pose is not None
-    return None if is_posed else no_handles(editor)
+    return None if is_posed else _no_handles(editor)
 
 
 def _toggle_ring(editor: Editor) -> None:
@@ -243,21 +234,6 @@ def _nothing_to_remove(editor: Editor) -> str | None:
     return no_lift(editor) if editor.view.tool is ToolName.PLACE else no_handle(editor)
 
 
-def _no_place_for_a_pin(editor: Editor) -> str | None:
-    is_there = editor.hover.surface is not None or editor.hover.handle is not None
-    return no_lift(editor) or (None if is_there else t("Point at the object to pin it there"))
-
-
-def _no_key(editor: Editor) -> str | None:
-    is_there = editor.keying.count > 0
-    return no_lift(editor) or (None if is_there else t("There is no key pose yet"))
-
-
-def _nothing_to_replace(editor: Editor) -> str | None:
-    is_same = editor.keying.shown is not None
-    return _no_key(editor) or (t("Nothing has changed since") if is_same else None)
-
-
 def _send_back(editor: Editor) -> None:
     editor.posing.send_back(editor.posing.selected, t("Reset handle"))
 
@@ -275,10 +251,10 @@ POSE_COMMANDS: dict[str, Command] = {
     ),
     "pin": Command("Pin under the pointer", "P", lambda e: e.posing.pin(), _no_place_for_a_pin),
     "select_handles": Command(
-        "Select all handles", "Ctrl+A", lambda e: e.posing.select_all(), no_handles
+        "Select all handles", "Ctrl+A", lambda e: e.posing.select_all(), _no_handles
     ),
     "reset_handle": Command("Reset handle", "", _send_back, no_handle),
-    "reset_handles": Command("Reset all handles", "", _send_all_back, no_handles),
+    "reset_handles": Command("Reset all handles", "", _send_all_back, _no_handles),
     "reset_pose": Command("Reset pose", "", lambda e: e.posing.reset(), _no_pose),
     "ring": Command(
         "Rotation ring", "R", _toggle_ring, no_lift, lambda e: e.view.pose.has_ring

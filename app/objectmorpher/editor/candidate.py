@@ -169,8 +169,7 @@ class Candidates:
         return is_near and replace(known, clicks=(*known.clicks[:-1], b)) == prompt
 
     def _ask(self, prompt: Prompt, now: float) -> None:
-        editor, document = self._editor, self._editor.document
-        assert document is not None
+        editor, document = self._editor, self._editor.opened
         photo, before = document.photo, editor.mask
         self._asked = prompt
         editor.jobs.cancel(CLOSER, RELUCTANCE)
@@ -214,8 +213,7 @@ class Candidates:
                 self.shown = replace(shown, found=answer)
 
         editor = self._editor
-        assert editor.document is not None
-        asked = edits.beside(editor.document, editor.current, shown.prompt)
+        asked = edits.beside(editor.opened, editor.current, shown.prompt)
         editor.jobs.start(
             "Looking closer", job_functions.closer_look, shown.photo.pixels, asked,
             choice_of(editor), done=accept, failed=lambda error: None, kind=CLOSER,
@@ -295,8 +293,7 @@ class CloserLook:
 
     def _ask(self, owed: _Glance) -> None:
         editor = self._editor
-        document = editor.document
-        assert document is not None
+        document = editor.opened
         asked = edits.beside(document, owed.question.k, owed.asked)
 
         def accept(found: Found) -> None:

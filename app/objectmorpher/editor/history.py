@@ -117,7 +117,6 @@ class History:
         return len(self._steps)
 
     def label(self, index: int) -> str:
-        """Return the label of the step at `index`."""
         return self._steps[index].label
 
     # Snapshots

@@ -171,6 +171,18 @@ class EditorState:
         return document.objects[self.current]
 
     @property
+    def opened(self) -> Document:
+        """The document, for whatever is done only while one is open."""
+        assert self.document is not None
+        return self.document
+
+    @property
+    def chosen(self) -> EditObject:
+        """The current object, for whatever is done only where there is one."""
+        assert self.object is not None
+        return self.object
+
+    @property
     def mask(self) -> Mask | None:
         return self.object.mask if self.object else None
 

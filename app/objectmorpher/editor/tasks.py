@@ -349,8 +349,7 @@ class Tasks:
         return False
 
     def _ensure_front(self, k: int, item: EditObject) -> bool:
-        editor, document, mask = self._editor, self._editor.document, item.mask
-        assert document is not None
+        editor, document, mask = self._editor, self._editor.opened, item.mask
         if self._front is not None and self._front[0] is mask:
             matte = self._front[1]
             if matte is None:  # asked, or failed
@@ -379,7 +378,8 @@ class Tasks:
         if not any(o.lifted and not o.is_visitor for o in document.objects):
             return False
         if self._plate is not None and same(self._plate[0], wanted):
-            self._add_plate(self._plate[1])
+            plate = self._plate[1]
+            self._amend(lambda document: edits.set_plate(document, plate))
             return True
         if self._no_plate is not None and same(self._no_plate, wanted):
             return False
@@ -421,9 +421,6 @@ class Tasks:
     def fill_background(self) -> None:
         """Asks again for a background that was cancelled or failed."""
         self._no_plate = None
-
-    def _add_plate(self, plate: Plate) -> None:
-        self._amend(lambda document: edits.set_plate(document, plate))
 
     def _amend(self, change: Callable[[Document], Document]) -> None:
         """A computed addition to the current step, not a step of its own."""

@@ -13,6 +13,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.base.camera import Camera
@@ -205,6 +206,11 @@ class ViewState:
     def canvas_from_image(self, xy: np.ndarray) -> np.ndarray:
         """Canvas px (..., 2) of image px (..., 2)."""
         return (np.asarray(xy, dtype=np.float64) - (self.left, self.top)) * self.zoom
+
+    def canvas_box(self, low: ArrayLike, high: ArrayLike) -> tuple[float, float, float, float]:
+        """Canvas px of the box between two corners, image px."""
+        x0, y0, x1, y1 = self.canvas_from_image(np.array([low, high])).ravel().tolist()
+        return x0, y0, x1, y1
 
     def image_from_canvas(self, xy: np.ndarray | tuple[float, float]) -> np.ndarray:
         """Image px (..., 2) of canvas px (..., 2)."""

@@ -31,7 +31,8 @@ MOST_KEPT = 64  # copies; where every frame brings new things, the older ones go
 class Uploads:
     """Copies of things that do not change, until they are not asked for any more."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST_KEPT) -> None:
+        self._most = most
         self._kept: dict[tuple[str, int], tuple[Any, Releasable]] = {}
         self._used: set[tuple[str, int]] = set()
 
@@ -41,7 +42,7 @@ class Uploads:
         entry = self._kept.pop(key, None) or (thing, build())  # held: no other can get its id
         self._kept[key] = entry
         self._used.add(key)
-        while len(self._kept) > MOST_KEPT:
+        while len(self._kept) > self._most:
             self._kept.pop(next(iter(self._kept)))[1].release()
         copy: Any = entry[1]
         return copy
@@ -159,18 +160,19 @@ class PictureTexture:
         """
         fresh, self._touched = touched[self._touched :], len(touched)
         if pixels is not self._uploaded:
-            self._release()
+            self.release()
             self._uploaded, self._is_changing = pixels, bool(touched)
         elif fresh:
             self._is_changing = True
             if list(self._textures) == [0] and pixels is not None:
                 self._refresh(pixels, fresh)
             else:
-                self._release()
+                self.release()
         self._level = self._level_at(zoom)
         if self._level not in self._textures:
             shown = np.zeros((1, 1), np.uint8) if pixels is None else _as_u8(pixels)
-            self._textures[self._level] = self._made(_halved(shown, self._level))
+            halved = _halved(shown, self._level)
+            self._textures[self._level] = made_texture(self._context, halved, moderngl.LINEAR)
 
     def _level_at(self, zoom: float) -> int:
         """The most halved copy that still has as many px as are shown."""
@@ -182,15 +184,6 @@ class PictureTexture:
             return least
         return max(least, min(int(math.log2(1 / zoom)), int(math.log2(longer))))
 
-    def _made(self, shown: np.ndarray) -> moderngl.Texture:
-        height, width = shown.shape[:2]
-        channels = shown.size // (height * width)
-        data = np.ascontiguousarray(shown)
-        texture = self._context.texture((width, height), channels, data, alignment=1)
-        texture.repeat_x = texture.repeat_y = False
-        texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        return texture
-
     def _refresh(self, pixels: np.ndarray, boxes: Sequence[Box]) -> None:
         """The part around `boxes` once more. Mipmaps wait until the picture is another one."""
         x0, y0 = min(b[0] for b in boxes), min(b[1] for b in boxes)
@@ -198,7 +191,8 @@ class PictureTexture:
         part = np.ascontiguousarray(pixels[y0:y1, x0:x1])
         self._textures[0].write(part, viewport=(x0, y0, x1 - x0, y1 - y0), alignment=1)
 
-    def _release(self) -> None:
+    def release(self) -> None:
+        """Give the memory back."""
         for texture in self._textures.values():
             texture.release()
         self._textures.clear()
@@ -223,6 +217,18 @@ class PictureTexture:
         self.texture.use(unit)
 
 
+def made_texture(context: moderngl.Context, pixels: np.ndarray, near: int) -> moderngl.Texture:
+    """(h, w) or (h, w, channels), u8 or what f32 holds; `near`: how it is looked up between px."""
+    height, width = pixels.shape[:2]
+    is_u8 = pixels.dtype == np.uint8
+    data = np.ascontiguousarray(pixels, None if is_u8 else np.float32)
+    channels, kind = data.size // (height * width), "f1" if is_u8 else "f4"
+    texture = context.texture((width, height), channels, data, alignment=1, dtype=kind)
+    texture.repeat_x = texture.repeat_y = False
+    texture.filter = near, near
+    return texture
+
+
 def _halved(pixels: np.ndarray, times: int) -> np.ndarray:
     for _ in range(times):
         size = (max(pixels.shape[1] // 2, 1), max(pixels.shape[0] // 2, 1))
@@ -244,17 +250,6 @@ def _as_u8(pixels: np.ndarray) -> np.ndarray:
 
 BLEND, ORIGINAL = 7, 8  # texture units, bound for all passes: the blend, the photo
 ALL = np.ones((1, 1), np.float32)  # the edit everywhere
-
-
-class BlendTexture:
-    """The scene's blend on the GPU."""
-
-    def __init__(self, context: moderngl.Context) -> None:
-        self._texture = PictureTexture(context, has_mipmaps=False)
-
-    def use(self, scene: Scene) -> None:
-        self._texture.upload(ALL if scene.blend is None else scene.blend)
-        self._texture.use(BLEND, 1.0)
 
 
 def blend_cells(scene: Scene) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from objectmorpher_core.document.bounds import MODES, NORMAL
 
 from ..canvas.layer import CanvasLayer
 from ..editor.view import ViewState
-from .gpu_memory import BLEND, ORIGINAL, blend_cells
+from .gpu_memory import BLEND, ORIGINAL, blend_cells, made_texture
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject
 from .shaders import Programs, set_uniforms
@@ -165,14 +165,10 @@ class LayerPass:
         factors = np.pad(relit.factor, 1)
         if self._factors is not None:
             self._factors.release()
-        self._factors = self._upload(factors[..., None])
-        self._factors.filter = moderngl.LINEAR, moderngl.LINEAR
-        self._factors.repeat_x = self._factors.repeat_y = False
+        self._factors = made_texture(self._context, factors, moderngl.LINEAR)
         self._factors.use(RELIT)
         corner = np.array([relit.left, relit.top]) - relit.pitch
-        low = view.canvas_from_image(corner)
-        high = view.canvas_from_image(corner + relit.pitch * np.array(factors.shape[::-1]))
-        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+        return view.canvas_box(corner, corner + relit.pitch * np.array(factors.shape[::-1]))
 
     def _render(
         self, program: moderngl.Program, quad: moderngl.VertexArray, scene: Scene, view: ViewState
@@ -203,20 +199,12 @@ class LayerPass:
         """The layer's textures by their unit."""
         key = id(layer.rgba)  # it stays the same where the light changes
         if key not in self._uploaded:
-            textures = {LAYER: self._upload(layer.pixels)}
-            if layer.invented is not None:
-                textures[MARKS] = self._upload(layer.invented[..., None])
             near = moderngl.LINEAR if layer.is_coarse else moderngl.NEAREST
-            for texture in textures.values():
-                texture.filter = near, near
-                texture.repeat_x = texture.repeat_y = False
+            textures = {LAYER: made_texture(self._context, layer.pixels, near)}
+            if layer.invented is not None:
+                textures[MARKS] = made_texture(self._context, layer.invented, near)
             self._uploaded[key] = (layer, textures)
         return self._uploaded[key][1]
-
-    def _upload(self, pixels: np.ndarray) -> moderngl.Texture:
-        height, width, channels = pixels.shape
-        kind, data = "f1" if pixels.dtype == np.uint8 else "f4", np.ascontiguousarray(pixels)
-        return self._context.texture((width, height), channels, data, alignment=1, dtype=kind)
 
 
 def _appearance(thing: CanvasLayer | SplatObject) -> dict[str, Any]:
@@ -237,8 +225,7 @@ def _defines(scene: Scene, is_marked: bool, is_over: bool) -> list[str]:
 def photo_box(scene: Scene, view: ViewState) -> tuple[float, float, float, float]:
     """The photo on the canvas: what lies beyond it is not exported."""
     height, width = scene.photo.shape[:2]
-    (x0, y0), (x1, y1) = view.canvas_from_image(np.array([[0, 0], [width, height]]))
-    return float(x0), float(y0), float(x1), float(y1)
+    return view.canvas_box((0, 0), (width, height))
 
 
 # Grain on the GPU, for shaders/grain.glsl.
@@ -264,20 +251,14 @@ class GrainTextures:
             self._upload_noise(grain.noise, level)
         if self._amounts is not None:
             self._amounts.release()
-        self._amounts = self._texture(grain.padded)
-        self._amounts.filter = moderngl.LINEAR, moderngl.LINEAR
-        self._amounts.repeat_x = self._amounts.repeat_y = False
+        self._amounts = made_texture(self._context, grain.padded, moderngl.LINEAR)
         assert self._tile is not None and self._deviations is not None
         for texture, unit in zip((self._amounts, self._tile, self._deviations), units, strict=True):
             texture.use(unit)
         rows, columns = grain.padded.shape[:2]
         corner = np.array([grain.left, grain.top]) - grain.pitch
-        low = view.canvas_from_image(corner)
-        high = view.canvas_from_image(corner + grain.pitch * np.array([columns, rows]))
-        return {
-            "amounts_box": (float(low[0]), float(low[1]), float(high[0]), float(high[1])),
-            "grain_texel": float(2**level),
-        }  # fmt: skip
+        box = view.canvas_box(corner, corner + grain.pitch * np.array([columns, rows]))
+        return {"amounts_box": box, "grain_texel": float(2**level)}
 
     def _upload_noise(self, noise: Noise, level: int) -> None:
         for texture in (self._tile, self._deviations):
@@ -289,12 +270,5 @@ class GrainTextures:
         size = (width, height, bands)
         self._tile = self._context.texture_array(size, 3, data, alignment=1, dtype="f4")
         self._tile.filter = moderngl.NEAREST, moderngl.NEAREST
-        self._deviations = self._texture(noise.deviation[None])
-        self._deviations.filter = moderngl.NEAREST, moderngl.NEAREST
+        self._deviations = made_texture(self._context, noise.deviation[None], moderngl.NEAREST)
         self._noise, self._level = noise, level
-
-    def _texture(self, values: np.ndarray) -> moderngl.Texture:
-        """(h, w, channels) f32."""
-        height, width, channels = values.shape
-        data = np.ascontiguousarray(values, np.float32)
-        return self._context.texture((width, height), channels, data, alignment=1, dtype="f4")

@@ -18,7 +18,7 @@ from objectmorpher_core.document.bounds import NORMAL
 from ..canvas.layer import CanvasLayer
 from ..canvas.memo import same
 from ..editor.view import ViewState
-from .gpu_memory import BlendTexture, PictureTexture
+from .gpu_memory import ALL, BLEND, PictureTexture
 from .layer_pass import DefocusPass, LayerPass, photo_box
 from .photo_pass import PhotoPass
 from .scene import Colour, Scene, SplatObject
@@ -204,7 +204,6 @@ class KeptCanvas:
         return data[0], data[1], data[2]
 
     def forget(self) -> None:
-        """Forget everything."""
         if self.buffer is not None and self._color is not None:
             self.buffer.release()
             self._color.release()
@@ -271,7 +270,7 @@ class Renderer:
         self._is_emulated = any(word in self.gl_name.lower() for word in SOFTWARE)
         self.kind = ("tiles" if self._is_emulated else "gl") if wanted == "auto" else wanted
         self._context = context
-        self._blend = BlendTexture(context)
+        self._blend = PictureTexture(context, has_mipmaps=False)
         self._photo_pass = PhotoPass(context)
         self._layer_pass = LayerPass(context)
         self._defocus_pass = DefocusPass(context)
@@ -340,7 +339,7 @@ class Renderer:
     def _draw(self, scene: Scene, view: ViewState, viewport: Viewport) -> None:
         """Into the target."""
         self._use(viewport)
-        self._blend.use(scene)
+        self._use_blend(scene)
         self._photo_pass.draw(scene, view)
         self._layer_pass.draw(scene, view)
         for item in scene.objects:
@@ -352,7 +351,7 @@ class Renderer:
                 if not item.is_marked:
                     picture = self._defocus_pass.draw(picture, item, view.zoom)
                 self._use(viewport)
-                self._blend.use(scene)
+                self._use_blend(scene)
                 self._photo_pass.use_photo(view)
                 self._layer_pass.draw_picture(picture, item, scene, view)
         if self._splat_pass is not None:
@@ -391,6 +390,10 @@ class Renderer:
         self._target.use()
         self._context.viewport = viewport
         self._context.enable_only(moderngl.NOTHING)
+
+    def _use_blend(self, scene: Scene) -> None:
+        self._blend.upload(ALL if scene.blend is None else scene.blend)
+        self._blend.use(BLEND, 1.0)
 
     def _splats(self) -> SplatPass:
         """Made for the first object: its module needs the compiler."""

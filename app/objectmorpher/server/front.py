@@ -27,7 +27,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, ClassVar, Generic, TypeVar
 
 from objectmorpher_core.base.limits import CONNECTIONS
-from objectmorpher_core.base.limits import CONNECTIONS as MOST_CONNECTIONS
 from objectmorpher_core.base.limits import KEPT_BYTES as BLOB_LIMIT
 from objectmorpher_core.base.limits import REQUEST_BYTES as BODY_LIMIT
 from objectmorpher_core.base.limits import WAITING_JOBS as MOST_JOBS
@@ -248,7 +247,7 @@ class RequestLimits:
 
     body: int = BODY_LIMIT
     blobs: int = BLOB_LIMIT
-    connections: int = MOST_CONNECTIONS
+    connections: int = CONNECTIONS
     jobs: int = MOST_JOBS
 
 

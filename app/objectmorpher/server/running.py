@@ -45,7 +45,6 @@ def look_at_offers() -> Offers:
 
 
 def told_offers(offers: Offers) -> dict[str, Any]:
-    """Return the offers as JSON."""
     return {stage: asdict(offer) for stage, offer in offers.items()}
 
 
@@ -94,9 +93,6 @@ class Alone:
         finally:
             self._turn.release()
 
-    def close(self) -> None:
-        """Close; nothing was started."""
-
 
 @dataclass(frozen=True)
 class Call:
@@ -130,10 +126,6 @@ class Runner(Protocol):
 
     def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> JobOutcome:
         """Blocks until the outcome is there. Raises Cancelled soon after `stop` is set."""
-        ...
-
-    def close(self) -> None:
-        """Ends what was started."""
         ...
 
 

@@ -70,9 +70,6 @@ class Stages:
                 tell(0.0, "once more, in another process")
         return JobOutcome(error=f"{call.name} has ended {TRIES} processes of the server")
 
-    def close(self) -> None:
-        """See `Runner`; Serve ends the processes."""
-
     def _try(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> JobOutcome:
         """Raises one of Ray's errors where the process is lost."""
         from ray import exceptions

@@ -24,7 +24,7 @@ from objectmorpher_core.scripting.runner import RefineOptions
 from ..editor.settings import AUTO
 from ..worker import job_functions
 from ..worker.job_functions import BackendChoice, Cut, Cutout, Variant
-from .fitting import fits, is_photo
+from .fitting import fits, is_photo, is_sound
 from .message import MessageError, name_of
 
 MOST_VARIANTS = 12
@@ -138,12 +138,6 @@ def _check_mask(mask: Any, pixels: Any, what: str) -> None:
     )
 
 
-def _check_matte(matte: Matte) -> None:
-    shape = matte.alpha.shape
-    is_right = len(shape) == 2 and matte.foreground.shape == (*shape, 3) and matte.alpha.size > 0
-    _require(is_right, "a cut-out's alpha and colours are of different sizes")
-
-
 def _check_lift(cut: Cut, choice: BackendChoice, shape: LiftSettings) -> None:
     _check_photo(cut.pixels)
     _check_mask(cut.mask, cut.pixels, "mask")
@@ -176,7 +170,8 @@ def _check_repair(patch: Any, margin: float, choice: BackendChoice) -> None:
 
 def _check_shadow(cutout: Cutout, choice: BackendChoice) -> None:
     _check_fill(cutout.pixels, cutout.covered)
-    _check_matte(cutout.matte)
+    is_right = is_sound(cutout.matte, ())
+    _require(is_right, "a cut-out's alpha and colours are of different sizes")
 
 
 def _check_refine(edit: Any, how: RefineOptions) -> None:

@@ -19,7 +19,6 @@ SIZE = 1_000_000  # bytes, after which a new file is begun; one old one is kept
 
 
 def log_path() -> Path:
-    """Return the path of the log."""
     return settings_path().parent / NAME
 
 

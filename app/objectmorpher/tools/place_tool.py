@@ -175,8 +175,8 @@ def _depth(editor: Editor, first: Pointer) -> Change:
 
 def _scale(editor: Editor, first: Pointer) -> Change:
     """By how much farther from what stays the corner was pulled: its foot, or its centre."""
-    start, document = editor.placing.placement, editor.document
-    assert start is not None and document is not None
+    start, document = editor.placing.placement, editor.opened
+    assert start is not None
     stays = editor.view.canvas_from_image(document.photo.camera.project(editor.placing.pivot()))
     reach = max(float(np.linalg.norm(first.xy - stays)), 1.0)
 
@@ -254,8 +254,8 @@ def _ball(editor: Editor, first: Pointer) -> Change:
     rim. What is near the middle, where the ball would spin, and what is beside the object is held
     by a larger one.
     """
-    start, document, shown = editor.placing.placement, editor.document, gizmo(editor)
-    assert start is not None and document is not None and shown is not None
+    start, document, shown = editor.placing.placement, editor.opened, gizmo(editor)
+    assert start is not None and shown is not None
     camera, centre = editor.view.camera(document.photo.camera), editor.placing.centre()
     reach, side = shown.radius * centre[2] / camera.focal, -1.0
     seen = editor.posing.surface_at(first.xy)

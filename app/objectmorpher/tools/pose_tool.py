@@ -95,8 +95,7 @@ def _chosen(before: tuple[int, ...], handle: int, is_added: bool) -> tuple[int, 
 def _follow(editor: Editor, held: HeldHandles, start: Pointer, now: Pointer, depth: float) -> None:
     delta = (now.xy - start.xy) / editor.view.zoom  # (2,) image px
     if now.alt:
-        assert editor.document is not None
-        camera = editor.document.photo.camera
+        camera = editor.opened.photo.camera
         place, normal = list(held.lines.values())[-1]  # of the handle that was taken
         gone = along_line(camera, place, normal, delta)
         editor.posing.move_all({h: p + gone * n for h, (p, n) in held.lines.items()})
@@ -114,8 +113,7 @@ def turn(editor: Editor, start: Pointer, handle: int, is_ring: bool) -> Stroke:
     posing, began = editor.posing, editor.preview
     if handle not in posing.selected:
         posing.select(handle)
-    assert editor.document is not None
-    frame = editor.cache.facts.turn_of(editor.document, editor.current)
+    frame = editor.cache.facts.turn_of(editor.opened, editor.current)
     first = posing.turn_of(handle)
     roll = float(np.degrees(turn_about(frame @ first, SIGHT)))
     centre = editor.view.canvas_from_image(posing.spot(handle).xy)

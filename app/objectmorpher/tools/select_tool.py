@@ -58,8 +58,7 @@ class SelectTool:
     def _click(self, editor: Editor, pointer: Pointer, is_foreground: bool) -> None:
         other = editor.landing.moved_at(pointer.xy)
         if other is not None and other != editor.current:
-            assert editor.document is not None
-            if editor.document.objects[other].is_locked:
+            if editor.opened.objects[other].is_locked:
                 editor.say_locked(other)
             else:
                 editor.objects.take_up(other)

@@ -80,7 +80,6 @@ class PhotoMemory:
         self._reading: Reading | None = None
 
     def forget(self) -> None:
-        """Forget everything."""
         self._backend, self._segmenter, self._reading = "", None, None
 
     def reading(self, pixels: Pixels, backend: str, progress: Progress) -> Reading:

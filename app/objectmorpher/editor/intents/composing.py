@@ -117,8 +117,7 @@ class Composing:
     def _ask_plate(
         self, hints: tuple[Hint, ...], seed: int, label: str, end: Callable[[], None]
     ) -> None:
-        editor, document = self._editor, self._editor.document
-        assert document is not None
+        editor, document = self._editor, self._editor.opened
         masks, covered = masks_of(document), editor.derived.hidden(document)
 
         def take(plate: Plate) -> None:
@@ -309,8 +308,7 @@ class Composing:
     def ground(self, shadow: Shadow) -> float:
         """Return the angle, degrees above the ground, at which the camera sees the object."""
         editor = self._editor
-        assert editor.document is not None
-        return seen_from(editor.document, editor.current, shadow)
+        return seen_from(editor.opened, editor.current, shadow)
 
     def toggle_shadow(self) -> None:
         """Gives the current object a shadow, or takes it."""

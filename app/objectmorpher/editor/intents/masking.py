@@ -74,8 +74,7 @@ class Masking:
         item, view = self._editor.object, self._editor.view
         if item is None or item.selection is None or item.is_moved:
             return None
-        place = (view.left, view.top, view.zoom, view.width, view.height)
-        key = (item.selection, share, *place)
+        key = (item.selection, share, *view.place)
         if self._veil is None or not same(self._veil[0], key):
             alpha = share * on_canvas(view, 255 - mask_edit.as_coverage(item.selection))
             self._veil = key, tint(np.zeros((*alpha.shape, 3)), alpha)

@@ -168,8 +168,7 @@ class Objects:
     def _is_over_current(self, k: int) -> bool:
         """Whether object `k` is a copy exactly where the current one is: nobody sees which."""
         editor = self._editor
-        assert editor.document is not None
-        other, own = editor.document.objects[k], editor.object
+        other, own = editor.opened.objects[k], editor.object
         return own is not None and all(
             (other.lifted is own.lifted, other.pose is own.pose, other.placement == own.placement)
         )

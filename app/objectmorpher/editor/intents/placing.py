@@ -97,8 +97,8 @@ class Placing:
 
     def centre(self) -> np.ndarray:
         """(3,) world: the object's middle, about which its rings lie and a hand rolls it."""
-        document, thing = self._editor.document, self._editor.object
-        assert document is not None and thing is not None and thing.lifted is not None
+        document, thing = self._editor.opened, self._editor.chosen
+        assert thing.lifted is not None
         return centre_of(thing.placement, thing.lifted, document.photo.camera)
 
     # Holding it
@@ -106,9 +106,8 @@ class Placing:
     def hold(self, canvas_xy: np.ndarray | None = None) -> HeldPoint:
         """The object held by its surface at canvas px, or by its centre; on the ground by what
         it stands on."""
-        editor = self._editor
-        document, thing = editor.document, editor.object
-        assert document is not None and thing is not None and thing.lifted is not None
+        document, thing = self._editor.opened, self._editor.chosen
+        assert thing.lifted is not None
         camera, lifted, placement = document.photo.camera, thing.lifted, thing.placement
         ground = self.ground
         if ground is not None:
@@ -147,8 +146,7 @@ class Placing:
     @property
     def horizon(self) -> float:
         """Px, the row of the photo that the horizon is in."""
-        document = self._editor.document
-        assert document is not None
+        document = self._editor.opened
         return document.photo.size[1] / 2 if document.horizon is None else document.horizon
 
     @property
@@ -222,16 +220,16 @@ class Placing:
 
     def _standing(self) -> tuple[np.ndarray, LiftedObject, Camera, np.ndarray]:
         """The object's points (N, 3) world at rest, itself, the camera, and what is down there."""
-        document, thing = self._editor.document, self._editor.object
-        assert document is not None and thing is not None and thing.lifted is not None
+        document, thing = self._editor.opened, self._editor.chosen
+        assert thing.lifted is not None
         own = self._editor.derived.body_points(document, self._editor.current)
         points = thing.lifted.world_points(own)
         return points, thing.lifted, document.photo.camera, self.gimbal.down
 
     def _offsets(self, placement: Placement) -> np.ndarray:
         """(N, 3) world: where the object's Gaussians are from its centre, turned and scaled."""
-        document, thing = self._editor.document, self._editor.object
-        assert document is not None and thing is not None and thing.lifted is not None
+        document, thing = self._editor.opened, self._editor.chosen
+        assert thing.lifted is not None
         rest = replace(placement, move=(0.0, 0.0), depth=0.0)
         linear = rest.matrix(thing.lifted, document.photo.camera)[:3, :3]
         points = self._editor.derived.body_points(document, self._editor.current)

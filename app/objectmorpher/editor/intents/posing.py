@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -64,24 +64,20 @@ class Posing:
     def spot(self, handle: int) -> Spot:
         """Return the place of a handle's target in the view, and its distance."""
         editor = self._editor
-        assert editor.document is not None
-        assert editor.object is not None
-        target = editor.object.handles[handle].target
-        return editor.derived.spot(editor.document, editor.current, target)
+        target = editor.chosen.handles[handle].target
+        return editor.derived.spot(editor.opened, editor.current, target)
 
     def line(self, handle: int) -> tuple[F64, F64]:
         """A handle's target (3,) and the surface's normal (3,) there, both world."""
         editor = self._editor
-        assert editor.document is not None and editor.object is not None
-        own = editor.object.handles[handle]
-        place = editor.derived.world(editor.document, editor.current, own.target)
-        return place, editor.cache.facts.normal_at(editor.document, editor.current, own.point)
+        own = editor.chosen.handles[handle]
+        place = editor.derived.world(editor.opened, editor.current, own.target)
+        return place, editor.cache.facts.normal_at(editor.opened, editor.current, own.point)
 
     def turn_of(self, handle: int) -> F64:
         """The rotation vector (3,) of a handle, object frame: its own, or as it comes."""
         editor = self._editor
-        assert editor.object is not None
-        own, pose = editor.object.handles[handle], editor.object.pose
+        own, pose = editor.chosen.handles[handle], editor.chosen.pose
         return turn_at(pose, own.control_point) if own.turn is None else own.turn
 
     def forget(self) -> None:
@@ -261,8 +257,7 @@ class Posing:
     def change(self, changed: Document) -> None:
         """Previews the handles of `changed`, solved for from the pose that is shown."""
         editor, k = self._editor, self._editor.current
-        assert editor.object is not None
-        start = editor.object.pose or editor.derived.deformer(changed, k).rest()
+        start = editor.chosen.pose or editor.derived.deformer(changed, k).rest()
         solved = editor.derived.solved(changed, k, start, **DRAG)
         editor.preview = self._solved = self._restless = solved
 
@@ -407,48 +402,43 @@ class HandleNumbers:
     def _roll(self, h: int) -> float:
         """Radians about the line of sight."""
         editor = self._editor
-        assert editor.document is not None
-        turn = editor.cache.facts.turn_of(editor.document, editor.current)
+        turn = editor.cache.facts.turn_of(editor.opened, editor.current)
         return turn_about(turn @ self._posing.turn_of(h), SIGHT)
 
     def move(self, x: float, y: float, depth: float) -> None:
         """Previews the handle at image px, so many diameters farther than at rest."""
         editor = self._editor
-        h = self._posing.handle
-        assert h is not None and editor.object is not None and editor.document is not None
-        point = editor.object.handles[h].point
-        rest = editor.derived.spot(editor.document, editor.current, point)
+        point = editor.chosen.handles[self._h].point
+        rest = editor.derived.spot(editor.opened, editor.current, point)
         there = rest.moved(np.zeros(2), depth)
-        self._posing.drag(h, replace(there, xy=np.array([x, y])))
+        self._posing.drag(self._h, replace(there, xy=np.array([x, y])))
 
     def turn(self, degrees: float) -> None:
         """Previews the handle turned so far about the line of sight."""
-        posing = self._posing
-        h = posing.handle
-        assert h is not None
-        more = np.radians(degrees) - self._roll(h)
-        posing.turn(h, posing.turn_of(h), more * SIGHT)
+        more = np.radians(degrees) - self._roll(self._h)
+        self._posing.turn(self._h, self._posing.turn_of(self._h), more * SIGHT)
 
     def soften(self, softness: float) -> None:
         """Previews the handle giving way from now on: 0 = not at all."""
-        editor = self._editor
-        h = self._posing.handle
-        assert h is not None and editor.document is not None
-        self._posing.hold(edits.soften_handle(editor.document, editor.current, h, softness))
+        self._hold(edits.soften_handle, softness)
 
     def set_free(self, is_free: bool) -> None:
         """Whether it turns as the object does, or stays as it is turned now; one step."""
-        editor = self._editor
-        h = self._posing.handle
-        assert h is not None and editor.document is not None
-        turn = None if is_free else self._posing.turn_of(h)
-        self._posing.hold(edits.turn_handle(editor.document, editor.current, h, turn))
+        self._hold(edits.turn_handle, None if is_free else self._posing.turn_of(self._h))
         self._posing.finish(t("Free handle's turn") if is_free else t("Hold handle's turn"))
 
     def set_pin(self, is_pin: bool) -> None:
         """A pin holds, a handle is dragged; one step."""
-        editor = self._editor
-        h = self._posing.handle
-        assert h is not None and editor.document is not None
-        self._posing.hold(edits.set_pin(editor.document, editor.current, h, is_pin))
+        self._hold(edits.set_pin, is_pin)
         self._posing.finish(t("Make it a pin") if is_pin else t("Make it a handle"))
+
+    @property
+    def _h(self) -> int:
+        """The handle, for whatever is done only where its numbers are shown."""
+        assert self._posing.handle is not None
+        return self._posing.handle
+
+    def _hold(self, edit: Callable[..., Document], value: object) -> None:
+        """Previews the handle after an edit of it."""
+        editor = self._editor
+        self._posing.hold(edit(editor.opened, editor.current, self._h, value))

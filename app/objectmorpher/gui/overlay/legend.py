@@ -17,13 +17,14 @@ from ..widgets.panes import Rect
 from ..widgets.theme import PRIMARY, theme
 from ..widgets.widgets import bold_text, small_text
 from ..window.scenes import INPAINTED, LIFTED, REFINED
+from .canvas import DARK, WHITE
 
 WIDTH = 216.0  # points
 LINE = 20.0
 BAR = 12.0
 PAD = 12.0
 SWATCH = 14.0
-DARK, WHITE, GREY = "#0B0C0E", "#FFFFFF", "#B9BDC5"
+GREY = "#B9BDC5"
 
 
 class Legend:
@@ -76,8 +77,7 @@ class Legend:
     # Rows
 
     def _draw_depth(self) -> None:
-        document = self._editor.document
-        assert document is not None
+        document = self._editor.opened
         half = self._editor.cache.painter.spread(document).half
         self._bar(DEPTH_STOPS)
         self._text(t("near  −{half}", half=f"{half:.2f}"), WHITE)

@@ -45,10 +45,9 @@ def draw_frame(canvas: CanvasPainter) -> None:
     corners = canvas.on_canvas(shown.corners)
     canvas.polyline(corners, WHITE, width=1.0, alpha=0.5)
     names = [name for name in TURNS if part == name or not editor.hand.is_busy]
-    for name in names:
-        _draw_back(canvas, shown, name, ACCENT if part == name else COLOURS[name])
-    for name in names:
-        _draw_front(canvas, shown, name, ACCENT if part == name else COLOURS[name])
+    for is_front in (False, True):
+        for name in names:
+            _draw_ring(canvas, shown, name, ACCENT if part == name else COLOURS[name], is_front)
     if part == "depth" or not editor.hand.is_busy:  # what is not dragged is out of the way
         _draw_arrow(canvas, shown.arrow, ACCENT if part == "depth" else WHITE)
     for corner in corners:
@@ -72,16 +71,12 @@ def _runs(ring: Ring, is_wanted: bool) -> list[np.ndarray]:
     return [angles[first] + (angles[1] - angles[0]) * np.arange(count + 1)] if count else []
 
 
-def _draw_back(canvas: CanvasPainter, shown: Gizmo, name: str, color: str) -> None:
-    for angles in _runs(shown.rings[name], False):
+def _draw_ring(canvas: CanvasPainter, shown: Gizmo, name: str, color: str, is_front: bool) -> None:
+    """Its front, or the thinner back."""
+    width, alpha = (2.0, 1.0) if is_front else (1.0, 0.5)
+    for angles in _runs(shown.rings[name], is_front):
         for points in _around(shown, shown.rings[name].seen(angles)):
-            canvas.polyline(canvas.on_canvas(points), color, 1.0, is_closed=False, alpha=0.5)
-
-
-def _draw_front(canvas: CanvasPainter, shown: Gizmo, name: str, color: str) -> None:
-    for angles in _runs(shown.rings[name], True):
-        for points in _around(shown, shown.rings[name].seen(angles)):
-            canvas.polyline(canvas.on_canvas(points), color, 2.0, is_closed=False)
+            canvas.polyline(canvas.on_canvas(points), color, width, is_closed=False, alpha=alpha)
 
 
 def _around(shown: Gizmo, points: np.ndarray) -> list[np.ndarray]:
@@ -159,8 +154,7 @@ def _draw_trust(canvas: CanvasPainter, x: float, y: float) -> None:
     from objectmorpher_core.raster.trust import trust_in
 
     editor = canvas.editor
-    assert editor.document is not None, "its object is being turned"
-    sign = trust_in(editor.derived.draft(editor.document, editor.current)).sign
+    sign = trust_in(editor.derived.draft(editor.opened, editor.current)).sign
     words = {"fine": t("Fine"), "look closely": t("Look closely"), "guesswork": t("Guesswork")}
     canvas.label(words[sign], x, y, dot=TRUST[sign])
 

@@ -59,8 +59,7 @@ def draw_pose(canvas: CanvasPainter) -> None:
 def _draw_handles(canvas: CanvasPainter, thing: EditObject) -> None:
     """Anchors, how far the points went, the handles, the ring."""
     editor = canvas.editor
-    document = editor.document
-    assert document is not None
+    document = editor.opened
     pose = editor.view.pose
     if pose.has_anchors:
         for at in _apart(canvas.on_photo(editor.derived.anchors(document, editor.current))):
@@ -104,11 +103,10 @@ def _draw_mirror(canvas: CanvasPainter) -> None:
 def _draw_influence(canvas: CanvasPainter, handle: int) -> None:
     """How much each control point goes along: larger and warmer dots."""
     editor = canvas.editor
-    assert editor.document is not None
-    shares = editor.cache.facts.influence(editor.document, editor.current, handle)
-    shown = editor.cache.facts.seen(editor.document, editor.current) & (shares >= MOVES)
-    picture = editor.derived.control_points(editor.document, editor.current)
-    shown &= ((picture >= 0) & (picture <= editor.document.photo.size)).all(1)
+    shares = editor.cache.facts.influence(editor.opened, editor.current, handle)
+    shown = editor.cache.facts.seen(editor.opened, editor.current) & (shares >= MOVES)
+    picture = editor.derived.control_points(editor.opened, editor.current)
+    shown &= ((picture >= 0) & (picture <= editor.opened.photo.size)).all(1)
     places = canvas.at(picture[shown])
     for at, share in zip(places, np.clip(shares[shown], 0, 1).tolist(), strict=True):
         r, g, b = ((1 - share) * COLD + share * HOT).tolist()
@@ -121,15 +119,14 @@ def _draw_influence(canvas: CanvasPainter, handle: int) -> None:
 def draw_control_points(canvas: CanvasPainter) -> None:
     """The control points and their strongest links."""
     editor = canvas.editor
-    assert editor.document is not None
-    links = editor.derived.links(editor.document, editor.current, MAX_LINKED)
-    is_there = ((links >= 0) & (links <= editor.document.photo.size)).all((1, 2))
+    links = editor.derived.links(editor.opened, editor.current, MAX_LINKED)
+    is_there = ((links >= 0) & (links <= editor.opened.photo.size)).all((1, 2))
     ends = canvas.at(links[is_there].reshape(-1, 2))
     dark, white = theme.u32(DARK, 0.25), theme.u32(WHITE, 0.4)
     for start, end in zip(ends[::2], ends[1::2], strict=True):
         canvas.draw.add_line(start, end, dark, 2.5)
         canvas.draw.add_line(start, end, white, 1.0)
-    places = canvas.on_photo(editor.derived.control_points(editor.document, editor.current))
+    places = canvas.on_photo(editor.derived.control_points(editor.opened, editor.current))
     for at in _apart(places):
         canvas.dot(at, 1.8, alpha=0.8)
 
@@ -137,8 +134,7 @@ def draw_control_points(canvas: CanvasPainter) -> None:
 def _draw_hint_points(canvas: CanvasPainter, share: float) -> None:
     """The control points, quietly, while there is no handle: here is something to drag."""
     editor = canvas.editor
-    assert editor.document is not None
-    places = canvas.on_photo(editor.derived.control_points(editor.document, editor.current))
+    places = canvas.on_photo(editor.derived.control_points(editor.opened, editor.current))
     for at in _apart(places, HINTS_APART):
         canvas.dot(at, 1.7, alpha=0.9 * share)
 
@@ -148,8 +144,7 @@ def _draw_surface_point(canvas: CanvasPainter) -> None:
     editor = canvas.editor
     surface = editor.hover.surface
     assert surface is not None
-    assert editor.document is not None
-    at = canvas.at(editor.document.photo.camera.project(surface.world))[0]
+    at = canvas.at(editor.opened.photo.camera.project(surface.world))[0]
     if editor.hover.is_pin:
         canvas.diamond(at, 7, WHITE, 0.75)
         return
@@ -245,10 +240,7 @@ HATCHES: dict[PoseMode, tuple[tuple[float, ...], str]] = {  # angles of the line
 
 def draw_regions(canvas: CanvasPainter) -> None:
     """On the side that is seen."""
-    editor = canvas.editor
-    document = editor.document
-    assert document is not None
-    for region in editor.rigging.regions():
+    for region in canvas.editor.rigging.regions():
         if region.kind in HATCHES:
             _draw_hatched(canvas, region.kind, region.nodes)
         else:
@@ -275,17 +267,15 @@ def draw_brush(canvas: CanvasPainter) -> None:
 def _visible(canvas: CanvasPainter, nodes: I32) -> F64:
     """Where these control points are seen, (n, 2) window units; those behind are left out."""
     editor = canvas.editor
-    assert editor.document is not None
-    seen = editor.cache.facts.seen(editor.document, editor.current)
-    picture = editor.derived.control_points(editor.document, editor.current)
+    seen = editor.cache.facts.seen(editor.opened, editor.current)
+    picture = editor.derived.control_points(editor.opened, editor.current)
     xy = editor.view.canvas_from_image(picture[nodes[seen[nodes]]])
     return xy / canvas.ratio + (canvas.rect.x, canvas.rect.y)
 
 
 def _draw_hatched(canvas: CanvasPainter, kind: PoseMode, nodes: I32) -> None:
     editor = canvas.editor
-    assert editor.document is not None
-    spacing = editor.cache.facts.spacing(editor.document, editor.current)
+    spacing = editor.cache.facts.spacing(editor.opened, editor.current)
     radius = max(SPREAD * spacing * editor.view.zoom / canvas.ratio, theme.pt(LEAST))
     places = _visible(canvas, nodes)
     angles, color = HATCHES[kind]

@@ -168,12 +168,11 @@ def _draw_shadow(editor: Editor) -> None:
     if (reason := not_moved(editor)) is not None:
         note(f"{reason}.")
         return
-    assert editor.object is not None
     if editor.old_shadows.offer is None:
         command_button(editor, "take_shadow", width=-1)
     else:
         _draw_offer(editor)
-    shadow, preview = editor.object.shadow, editor.composing.preview_shadow
+    shadow, preview = editor.chosen.shadow, editor.composing.preview_shadow
     number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, low=0.0, high=100.0)
     change = number_field(number, 100 * shadow.strength)
     changed = replace(shadow, strength=change.value / 100)
@@ -216,8 +215,7 @@ def _draw_offer(editor: Editor) -> None:
 
 def _draw_direction(editor: Editor) -> None:
     """Name, dial, and the number beside it."""
-    assert editor.object is not None
-    shadow, top = editor.object.shadow, imgui.get_cursor_pos_y()
+    shadow, top = editor.chosen.shadow, imgui.get_cursor_pos_y()
     drop = theme.pt((SIDE - 28) / 2)
     imgui.set_cursor_pos_y(top + drop)
     imgui.align_text_to_frame_padding()
@@ -247,13 +245,12 @@ def _draw_light(editor: Editor) -> None:
     if (reason := not_moved(editor)) is not None:
         note(f"{reason}.")
         return
-    assert editor.object is not None
     choices = tuple(Segment(name, t(REFINERS.get(name, name))) for name in compose.REFINERS)
     editor.composing.choose_refiner(segmented("refiner", choices, editor.composing.refiner))
     if editor.composing.refiner == "none":
         note(t("Harmonise gives the object the light of its new place and of how it is turned."))
         return
-    item, preview = editor.object, editor.composing.preview_share
+    item, preview = editor.chosen, editor.composing.preview_share
     labels = t("Place"), t("Turning"), t("Grain"), t("Focus")
     for label, (name, usual) in zip(labels, USUAL_SHARES.items(), strict=True):
         number = Number(label, "%.0f %%", 0.5, 5.0, 100 * usual, 0.0, 100.0)
@@ -266,8 +263,7 @@ def _draw_light(editor: Editor) -> None:
 
 def _draw_finish(editor: Editor) -> None:
     heading(t("Object"))
-    assert editor.object is not None
-    finish, preview = editor.object.finish, editor.composing.preview_finish
+    finish, preview = editor.chosen.finish, editor.composing.preview_finish
     rows = (
         (Number(t("Opacity"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100.0), "opacity", 100.0),
         (Number(t("Exposure"), "%+.2f", 0.01, 0.25, 0.0, -MOST_EXPOSURE, MOST_EXPOSURE),
@@ -318,9 +314,8 @@ def _draw_paint(editor: Editor) -> None:
 
 def _draw_edge(editor: Editor) -> None:
     heading(t("Edge"))
-    assert editor.document is not None
     number = Number(t("Blend"), "%.2f ×", 0.005, 0.25, 1.0, LEAST_FEATHER, MOST_FEATHER)
-    change = number_field(number, editor.document.feather)
+    change = number_field(number, editor.opened.feather)
     preview = editor.composing.preview_feather
     take(editor, change, lambda: preview(change.value), t("Blend of edge"))
     note(t("How wide the edit fades into the photo."))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import COMMANDS, keys_of, next_step, run, why_not
+from ...commands import next_step, run, why_not
 from ...editor.editor import Editor
 from ...editor.history import History, Step
 from ...editor.view import CHANGING, ToolName
@@ -19,6 +19,7 @@ from ..widgets.widgets import (
     Emphasis,
     button,
     command_button,
+    command_icon,
     drawn_button,
     fill_row,
     gap,
@@ -39,15 +40,6 @@ from .select import draw_mask, draw_select
 NEXT = 176.0  # points, width of the next step's button over the photo
 
 
-class _Scroll:
-    """Whether the panel had more than there is room for when it was drawn last."""
-
-    is_needed = False
-
-
-_scroll = _Scroll()
-
-
 def draw_inspector(editor: Editor, rect: Rect) -> None:
     """The whole panel, or where there is no room for it the button that unfolds it."""
     if not editor.view.has_panel:
@@ -55,7 +47,7 @@ def draw_inspector(editor: Editor, rect: Rect) -> None:
         return
     with pane(INSPECTOR, rect):
         foot = theme.pt(PRIMARY + 24)
-        bar = imgui.get_style().scrollbar_size if _scroll.is_needed else 0.0
+        bar = imgui.get_style().scrollbar_size if _seen.needs_scroll else 0.0
         across = imgui.get_content_region_avail().x + bar  # the bar stands in the padding
         size = ImVec2(across, rect.height - foot - theme.pt(12))
         imgui.begin_child("##scroll", size, imgui.ChildFlags_.nav_flattened)
@@ -67,9 +59,9 @@ def draw_inspector(editor: Editor, rect: Rect) -> None:
         else:
             _PANELS[editor.view.tool](editor)
         draw_history(editor)
-        _scroll.is_needed = imgui.get_scroll_max_y() > 0
+        _seen.needs_scroll = imgui.get_scroll_max_y() > 0
         imgui.end_child()
-        if _scroll.is_needed:
+        if _seen.needs_scroll:
             top = rect.y + rect.height - foot + 0.5
             edge((rect.x, top), (rect.x + rect.width, top))
         _draw_foot(editor, rect, foot)
@@ -78,9 +70,7 @@ def draw_inspector(editor: Editor, rect: Rect) -> None:
 
 def _draw_folded(editor: Editor, rect: Rect) -> None:
     with pane(INSPECTOR, rect, padding=(2, 8)):
-        hint = f"{t(COMMANDS['panel'].label)} ({keys_of(editor, 'panel')})"
-        if icon_button(Icon.SPLIT, "panel", hint, None, FOLDED - 4):
-            run(editor, "panel")
+        command_icon(editor, "panel", Icon.SPLIT, FOLDED - 4)
         edge((rect.x + 0.5, rect.y), (rect.x + 0.5, rect.y + rect.height))
     _draw_next(editor, rect)
 
@@ -220,9 +210,10 @@ def _draw_step(k: int, label: str, cursor: int) -> bool:
 
 
 class _Seen:
-    """What the list showed when it was drawn last."""
+    """What the panel and its list showed when they were drawn last."""
 
     def __init__(self) -> None:
+        self.needs_scroll = False  # the panel had more than there was room for
         self.is_shown = False
         self.name = ""  # of a snapshot, as it is being typed
         self.step: tuple[int, int] = (-1, -1)  # the current one, and how many there were

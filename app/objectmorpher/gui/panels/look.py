@@ -7,7 +7,7 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core.document.bounds import LEAST_THICKNESS, MOST_THICKNESS
 
 from ...canvas.painter import shown_now
-from ...commands import COMMANDS, keys_of, run, why_not
+from ...commands import hint_of, keys_of, run, why_not
 from ...editor.editor import Editor
 from ...editor.view import Shown
 from ...system.texts import t
@@ -42,8 +42,7 @@ def draw_look(editor: Editor) -> None:
     for shown in Shown:
         _draw_view(editor, shown)
     gap(12)
-    label = t(COMMANDS["reset_look"].label)
-    command_button(editor, "reset_look", f"{Icon.RESET}  {label}")
+    command_button(editor, "reset_look", icon=Icon.RESET)
     gap(12)
     heading(t("Before and after"))
     is_split = editor.view.split is not None
@@ -96,8 +95,7 @@ def _draw_zooms(editor: Editor) -> None:
         command_button(editor, name, t(label), across / theme.scale)
         imgui.pop_style_var()
         if why_not(editor, name) is None:
-            keys = keys_of(editor, name)
-            tooltip(t(COMMANDS[name].label) + (f" ({keys})" if keys else ""))
+            tooltip(hint_of(editor, name))
 
 
 # The object's shape in the Look tool, where it is seen from all sides.
@@ -120,8 +118,7 @@ def draw_shape(editor: Editor) -> None:
     else:
         note(f"{reason}.")
         _draw_poses(editor)
-    label = t(COMMANDS["import_shape"].label)
-    command_button(editor, "import_shape", f"{Icon.CUBE}  {label}")
+    command_button(editor, "import_shape", icon=Icon.CUBE)
     gap(12)
 
 
@@ -222,8 +219,7 @@ def _draw_photos(editor: Editor) -> None:
         imgui.same_line()
         imgui.align_text_to_frame_padding()
         imgui.text_unformatted(view.photo)
-    label = t(COMMANDS["add_photo"].label)
-    command_button(editor, "add_photo", f"{Icon.IMAGE}  {label}")
+    command_button(editor, "add_photo", icon=Icon.IMAGE)
     if why_not(editor, "add_photo") is None:
         tooltip(t("The main subject of that photo, or what is selected where it is open in a tab"))
 

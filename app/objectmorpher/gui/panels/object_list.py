@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.document.model import Prompt
 
-from ...commands import COMMANDS, keys_of, run, why_not
+from ...commands import run
 from ...editor.editor import Editor
 from ...system.texts import t
 from ..widgets.panes import has_panel
@@ -17,6 +17,7 @@ from ..widgets.theme import SMALL_SIZE, Icon, theme
 from ..widgets.widgets import (
     Emphasis,
     button,
+    command_icon,
     drawn_button,
     end_row,
     fill_row,
@@ -91,11 +92,8 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
     for i, (icon, name) in enumerate(buttons):
         imgui.same_line(left + i * (theme.pt(SIDE) + gap))
         imgui.set_cursor_pos_y(top - theme.pt(4))
-        keys = keys_of(editor, name)
-        hint = t(COMMANDS[name].label) + (f" ({keys})" if keys else "")
         # Below, the tooltip would be over the eye and the lock of the first row.
-        if icon_button(icon, name, hint, why_not(editor, name), SIDE, is_above=True):
-            run(editor, name)
+        command_icon(editor, name, icon, SIDE, is_above=True)
     imgui.pop_font()
 
 
@@ -174,8 +172,7 @@ def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
         return False
     if drawn_button(f"##object{k}", size) and not _is_dragged:
         editor.objects.choose(k)
-    assert editor.document is not None
-    mark(f"row of {editor.document.objects[k].name}")
+    mark(f"row of {editor.opened.objects[k].name}")
     if imgui.is_item_active() and imgui.is_mouse_dragging(0, theme.pt(SLACK)) and not _is_dragged:
         _is_dragged = editor.objects.carry(k)
     is_hovered = imgui.is_item_hovered()
@@ -194,9 +191,8 @@ def _draw_name(name: str, is_visible: bool, at: ImVec2, end: ImVec2) -> None:
 
 def _draw_field(editor: Editor, k: int, start: ImVec2, width: float) -> None:
     """Enter or a click elsewhere takes the name, Esc leaves the old one."""
-    assert editor.document is not None
     if _typing.of != k:
-        _typing.of, _typing.text = k, editor.document.objects[k].name
+        _typing.of, _typing.text = k, editor.opened.objects[k].name
         _typing.has_focus = False
     if not _typing.has_focus and not imgui.is_mouse_down(0):
         imgui.set_keyboard_focus_here()

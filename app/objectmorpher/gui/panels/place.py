@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from objectmorpher_core.document.model import Placement
 
-from ...commands import COMMANDS, run, why_not
+from ...commands import run
 from ...editor.editor import Editor
 from ...system.texts import t
 from ..widgets.theme import SMALL_SIZE, Icon, theme
@@ -18,9 +18,9 @@ from ..widgets.widgets import (
     Number,
     checkbox,
     command_button,
+    command_icon,
     gap,
     heading,
-    icon_button,
     note,
     number_field,
     small_text,
@@ -84,8 +84,7 @@ def draw_place(editor: Editor) -> None:
         if group.title == "Turn":
             _draw_seen_from(editor)
         gap(12)
-    label = t(COMMANDS["reset_place"].label)
-    command_button(editor, "reset_place", f"{Icon.RESET}  {label}")
+    command_button(editor, "reset_place", icon=Icon.RESET)
     gap(12)
     draw_timeline(editor)
 
@@ -108,10 +107,8 @@ def _draw_title(editor: Editor, group: Group) -> None:
     heading(t(group.title))
     imgui.same_line(imgui.get_content_region_avail().x + imgui.get_cursor_pos_x() - theme.pt(RESET))
     imgui.set_cursor_pos_y(top)
-    name, command = group.command, COMMANDS[group.command]
     imgui.push_font(None, SMALL_SIZE - 2)
-    if icon_button(Icon.RESET, name, t(command.label), why_not(editor, name), RESET):
-        run(editor, name)
+    command_icon(editor, group.command, Icon.RESET, RESET)
     imgui.pop_font()
 
 

@@ -66,7 +66,7 @@ def draw_pose(editor: Editor) -> None:
     half = half_width()
     command_button(editor, "reset_handles", width=half)
     imgui.same_line()
-    command_button(editor, "reset_pose", f"{Icon.RESET}  {t('Reset pose')}", half)
+    command_button(editor, "reset_pose", width=half, icon=Icon.RESET)
     gap(12)
     draw_timeline(editor)
 
@@ -327,7 +327,7 @@ def draw_timeline(editor: Editor) -> None:
     if editor.keying.count < 2:
         note(t("Keep two poses or more: a video can show the way from one to the next."))
     half = half_width()
-    command_button(editor, "add_key", f"{Icon.PLUS}  {t('Add key pose')}", -1)
+    command_button(editor, "add_key", icon=Icon.PLUS)
     if not editor.keying.count:
         return
     command_button(editor, "replace_key", t("Replace"), half)

@@ -38,6 +38,16 @@ ICONS = {
     "remove_islands": Icon.BROOM, "import_mask": Icon.IMPORT, "export_mask": Icon.EXPORT,
     "harden": Icon.IMAGE, "subject": Icon.PERSON, "import_shape": Icon.CUBE,
 }  # fmt: skip
+HINTS = {  # what a press does, where the label does not say it
+    "grow": "Add a rim of this many pixels",
+    "shrink": "Take away a rim of this many pixels",
+    "smooth": "Straighten the edge: teeth and specks go",
+    "feather": "Make the edge soft by this many pixels to each side",
+    "fill_holes": "Select what the selection encloses",
+    "remove_islands": "Take away the small pieces beside the large one",
+    "import_shape": "Put a 3D file (splats or a mesh) where the object is in the photo",
+    "harden": "Forget the softness you painted: the edge follows the photo again",
+}
 
 
 def draw_edge(editor: Editor) -> None:
@@ -66,26 +76,10 @@ def draw_pair(editor: Editor, left: str, right: str) -> None:
 
 def draw_command(editor: Editor, name: str, width: float = -1.0) -> None:
     """A command as a button; `width` in points, -1 fills."""
-    label = f"{ICONS[name]}  {t(COMMANDS[name].label)}##{name}"
-    command_button(editor, name, label, width)
-    hint = _hint(name)
-    if hint and why_not(editor, name) is None:
-        tooltip(hint)
-
-
-def _hint(name: str) -> str:
-    """What a press does, where the label does not say it."""
-    hints = {
-        "grow": t("Add a rim of this many pixels"),
-        "shrink": t("Take away a rim of this many pixels"),
-        "smooth": t("Straighten the edge: teeth and specks go"),
-        "feather": t("Make the edge soft by this many pixels to each side"),
-        "fill_holes": t("Select what the selection encloses"),
-        "remove_islands": t("Take away the small pieces beside the large one"),
-        "import_shape": t("Put a 3D file (splats or a mesh) where the object is in the photo"),
-        "harden": t("Forget the softness you painted: the edge follows the photo again"),
-    }
-    return hints.get(name, "")
+    label = f"{t(COMMANDS[name].label)}##{name}"
+    command_button(editor, name, label, width, ICONS[name])
+    if name in HINTS and why_not(editor, name) is None:
+        tooltip(t(HINTS[name]))
 
 
 def draw_decontaminate(editor: Editor) -> None:

@@ -30,26 +30,14 @@ FILL = -1.0  # as wide as there is room
 
 def draw_method(editor: Editor, stage: str) -> None:
     """The list of "segment", "lift", "inpaint" or "refine"; what is chosen holds from now on."""
+    choices = [
+        Segment(method.name, _label(editor, stage, method.name), why_not=method.why_not)
+        for method in editor.methods.of(stage)
+    ]
     chosen = editor.methods.chosen(stage)
     imgui.set_next_item_width(FILL)
-    is_open = imgui.begin_combo(f"##{stage}", _label(editor, stage, chosen))
-    mark(stage)
-    if not is_open:
-        return
-    for method in editor.methods.of(stage):
-        is_disabled = method.why_not is not None
-        flags = imgui.SelectableFlags_.disabled if is_disabled else imgui.SelectableFlags_.none
-        label = _label(editor, stage, method.name)
-        if imgui.selectable(label, method.name == chosen, flags)[0]:
-            editor.methods.choose(stage, method.name)
-        if method.name == chosen:
-            imgui.set_item_default_focus()  # the arrows go on from it
-        mark(f"{stage}: {method.name}")
-        if method.why_not is not None:
-            tooltip(sentence(method.why_not))
-    if imgui.is_key_pressed(imgui.Key.escape):
-        imgui.close_current_popup()
-    imgui.end_combo()
+    if (wanted := unfolding(stage, choices, chosen, stage)) != chosen:
+        editor.methods.choose(stage, wanted)
 
 
 def _label(editor: Editor, stage: str, name: str) -> str:
@@ -85,27 +73,28 @@ class Segment(Generic[T]):
 
 def segmented(name: str, choices: Sequence[Segment[T]], chosen: T) -> T:
     """Draw values side by side, as wide as there is room, and return the chosen one."""
-    start = imgui.get_cursor_screen_pos()
-    across = imgui.get_content_region_avail().x
-    height, part = theme.pt(FIELD), across / len(choices)
-    draw = imgui.get_window_draw_list()
-    end = ImVec2(start.x + across, start.y + height)
-    draw.add_rect_filled(start, end, theme.u32("raised"), theme.pt(RADIUS))
-    for i, choice in enumerate(choices):
-        low = ImVec2(round(start.x + i * part), start.y)
-        size = ImVec2(round(start.x + (i + 1) * part) - low.x, height)
-        imgui.set_cursor_screen_pos(low)
-        imgui.begin_disabled(choice.why_not is not None)
-        if drawn_button(f"##{name}{i}", size):
+    return _draw_row(name, choices, len(choices), chosen, is_tall=False)
+
+
+def unfolding(name: str, choices: Sequence[Segment[T]], chosen: T, marked: str = "") -> T:
+    """A list that unfolds, and the chosen one of its values; `marked`: how tests call it."""
+    preview = next(choice.label for choice in choices if choice.value == chosen)
+    is_open, before = imgui.begin_combo(f"##{name}", preview), chosen
+    mark(marked or preview)
+    if not is_open:
+        return chosen
+    for choice in choices:
+        flags = imgui.SelectableFlags_.disabled if choice.why_not else imgui.SelectableFlags_.none
+        if imgui.selectable(choice.label, choice.value == before, flags)[0]:
             chosen = choice.value
-        mark(choice.label if clean(choice.label) else choice.hint)
-        imgui.end_disabled()
-        is_hovered = imgui.is_item_hovered()
-        if choice.hint or choice.why_not:
-            tooltip("\n".join(text for text in (choice.hint, choice.why_not) if text))
-        _draw_part(low, size, choice, choice.value == chosen, is_hovered)
-    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y))
-    imgui.dummy(ImVec2(across, 0))
+        if choice.value == before:
+            imgui.set_item_default_focus()  # the arrows go on from it
+        mark(f"{marked}: {choice.value}" if marked else choice.label)
+        if choice.why_not:
+            tooltip(sentence(choice.why_not))
+    if imgui.is_key_pressed(imgui.Key.escape):
+        imgui.close_current_popup()
+    imgui.end_combo()
     return chosen
 
 
@@ -122,13 +111,16 @@ def named_icons(name: str, choices: Sequence[Segment[T]], chosen: T) -> T:
     across = len(choices) if fits else -(-len(choices) // 2)
     for first in range(0, len(choices), across):
         row = choices[first : first + across]
-        chosen = _draw_row_of_icons(f"{name}{first}", row, across, chosen)
+        chosen = _draw_row(f"{name}{first}", row, across, chosen, is_tall=True)
     return chosen
 
 
-def _draw_row_of_icons(name: str, choices: Sequence[Segment[T]], columns: int, chosen: T) -> T:
+def _draw_row(
+    name: str, choices: Sequence[Segment[T]], columns: int, chosen: T, is_tall: bool
+) -> T:
+    """`is_tall`: each icon above its word, else before it."""
     start = imgui.get_cursor_screen_pos()
-    width, height = imgui.get_content_region_avail().x, theme.pt(TALL)
+    width, height = imgui.get_content_region_avail().x, theme.pt(TALL if is_tall else FIELD)
     part, end = width / columns, ImVec2(start.x + width, start.y + height)
     draw = imgui.get_window_draw_list()
     draw.add_rect_filled(start, end, theme.u32("raised"), theme.pt(RADIUS))
@@ -136,38 +128,39 @@ def _draw_row_of_icons(name: str, choices: Sequence[Segment[T]], columns: int, c
         low = ImVec2(round(start.x + i * part), start.y)
         size = ImVec2(round(start.x + (i + 1) * part) - low.x, height)
         imgui.set_cursor_screen_pos(low)
+        imgui.begin_disabled(choice.why_not is not None)
         if drawn_button(f"##{name}{i}", size):
             chosen = choice.value
-        mark(choice.hint or choice.label)
-        is_chosen, is_hovered = choice.value == chosen, imgui.is_item_hovered()
-        if choice.hint:
-            tooltip(choice.hint)
-        role = _draw_ground(low, size, is_chosen, is_hovered)
-        middle = low.x + size.x / 2
-        icon = imgui.calc_text_size(choice.icon)
-        draw.add_text(
-            ImVec2(round(middle - icon.x / 2), round(low.y + theme.pt(6))), theme.u32(role),
-            choice.icon,
-        )  # fmt: skip
-        imgui.push_font(None, WORD)
-        word = imgui.calc_text_size(choice.label)
-        at = ImVec2(round(middle - word.x / 2), round(end.y - theme.pt(5) - word.y))
-        draw.add_text(at, theme.u32(role), choice.label)
-        imgui.pop_font()
+        has_word = bool(clean(choice.label)) and not (is_tall and choice.hint)
+        mark(choice.label if has_word else choice.hint)
+        imgui.end_disabled()
+        is_hovered = imgui.is_item_hovered()
+        if choice.hint or choice.why_not:
+            tooltip("\n".join(text for text in (choice.hint, choice.why_not) if text))
+        role = _draw_ground(low, size, choice.value == chosen, is_hovered)
+        (_draw_tall if is_tall else _draw_flat)(low, size, choice, role)
     imgui.set_cursor_screen_pos(ImVec2(start.x, end.y))
     imgui.dummy(ImVec2(width, 0))
     return chosen
 
 
-def _draw_part(
-    low: ImVec2, size: ImVec2, choice: Segment, is_chosen: bool, is_hovered: bool
-) -> None:
-    role = _draw_ground(low, size, is_chosen, is_hovered)
+def _draw_flat(low: ImVec2, size: ImVec2, choice: Segment, role: str) -> None:
     alpha = imgui.get_style().disabled_alpha if choice.why_not else 1.0
     shown = f"{choice.icon}  {choice.label}" if choice.icon else choice.label
     text = imgui.calc_text_size(shown)
     at = ImVec2(round(low.x + (size.x - text.x) / 2), round(low.y + (size.y - text.y) / 2))
     imgui.get_window_draw_list().add_text(at, theme.u32(role, alpha), shown)
+
+
+def _draw_tall(low: ImVec2, size: ImVec2, choice: Segment, role: str) -> None:
+    draw, ink, middle = imgui.get_window_draw_list(), theme.u32(role), low.x + size.x / 2
+    left = round(middle - imgui.calc_text_size(choice.icon).x / 2)
+    draw.add_text(ImVec2(left, round(low.y + theme.pt(6))), ink, choice.icon)
+    imgui.push_font(None, WORD)
+    word = imgui.calc_text_size(choice.label)
+    top = round(low.y + size.y - theme.pt(5) - word.y)
+    draw.add_text(ImVec2(round(middle - word.x / 2), top), ink, choice.label)
+    imgui.pop_font()
 
 
 def _draw_ground(low: ImVec2, size: ImVec2, is_chosen: bool, is_hovered: bool) -> str:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import COMMANDS, run, why_not
+from ...commands import COMMANDS, hint_of, run, why_not
 from ...editor.editor import Editor
-from ...render.gpu_memory import PictureTexture
+from ...render.gpu_memory import Uploads
 from ...render.renderer import Renderer
 from ...system.texts import t
 from ...tools.pointer import SNAP
@@ -31,23 +31,17 @@ class Textures:
 
     def __init__(self) -> None:
         self._renderer: Renderer | None = None
-        self._textures: dict[int, tuple[np.ndarray, PictureTexture]] = {}
+        self._kept = Uploads(KEPT)
 
     def use(self, renderer: Renderer) -> None:
         """The window's renderer, whose context owns the textures."""
-        self._renderer, self._textures = renderer, {}
+        self._renderer, self._kept = renderer, Uploads(KEPT)
 
     def texture(self, pixels: np.ndarray) -> imgui.ImTextureRef:
         """Return ImGui's texture of `pixels` (h, w, 3) u8."""
-        assert self._renderer is not None, "the window says which renderer"
-        found = self._textures.pop(id(pixels), None)
-        if found is None:
-            found = (pixels, self._renderer.picture(pixels))
-        self._textures[id(pixels)] = found
-        while len(self._textures) > KEPT:
-            oldest = next(iter(self._textures))
-            self._textures.pop(oldest)[1].texture.release()
-        return imgui.ImTextureRef(found[1].glo)
+        renderer = self._renderer
+        assert renderer is not None, "the window says which renderer"
+        return imgui.ImTextureRef(self._kept("", pixels, lambda: renderer.picture(pixels)).glo)
 
 
 pictures = Textures()
@@ -104,9 +98,7 @@ def tooltip(text: str, is_above: bool = False) -> None:
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(*TIP_PADDING))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(RADIUS))
         imgui.begin_tooltip()
-        imgui.push_text_wrap_pos(theme.pt(TIP_WIDTH))
-        imgui.text_unformatted(text)
-        imgui.pop_text_wrap_pos()
+        wrapped_text(text, end=theme.pt(TIP_WIDTH))
         low, size = imgui.get_window_pos(), imgui.get_window_size()
         mark_on_canvas("Tooltip", low, ImVec2(low.x + size.x, low.y + size.y))
         imgui.end_tooltip()
@@ -276,12 +268,15 @@ def heading(text: str) -> None:
 
 def note(text: str) -> None:
     """Secondary text, wrapped."""
-    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(text)
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()
+    wrapped_text(text, "secondary")
     sought.meet(text, has_field=False)
+
+
+def wrapped_text(text: str, role: str = "text", end: float = 0.0) -> None:
+    """`end`: where its lines end, window units; 0 at the window's edge."""
+    imgui.push_text_wrap_pos(end)
+    imgui.text_colored(theme.vec(role), text)
+    imgui.pop_text_wrap_pos()
 
 
 def gap(points: float) -> None:
@@ -396,13 +391,23 @@ def checkbox(label: str, is_on: bool) -> bool:
 # A command as a button.
 
 
-def command_button(editor: Editor, name: str, label: str = "", width: float = -1.0) -> None:
+def command_button(
+    editor: Editor, name: str, label: str = "", width: float = -1.0, icon: str = ""
+) -> None:
     """It says `label`, else the command's name; `width` in points, -1 fills.
 
     Where the command cannot run it is greyed out, and the reason is its tooltip.
     """
     shown = label or t(COMMANDS[name].label)
-    if button(shown, why_not=why_not(editor, name), width=width):
+    if button(f"{icon}  {shown}" if icon else shown, why_not=why_not(editor, name), width=width):
+        run(editor, name)
+
+
+def command_icon(
+    editor: Editor, name: str, icon: str, side: float = FIELD, is_above: bool = False
+) -> None:
+    """A command as an icon; what it is called, and its keys, are its tooltip."""
+    if icon_button(icon, name, hint_of(editor, name), why_not(editor, name), side, is_above):
         run(editor, name)
 
 

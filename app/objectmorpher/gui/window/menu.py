@@ -6,14 +6,14 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import COMMANDS, keys_of, run
+from ...commands import COMMANDS, hint_of, keys_of, run
 from ...editor.editor import Editor
 from ...editor.view import Shown, ToolName
 from ...system.texts import t
 from ..widgets import panes
 from ..widgets.panes import Rect, edge, pane
 from ..widgets.theme import Icon, theme
-from ..widgets.widgets import fitted, icon_button, tooltip
+from ..widgets.widgets import command_icon, fitted, tooltip
 from .landmarks import mark
 
 # The tool strip at the left.
@@ -57,7 +57,7 @@ def _draw_tool(editor: Editor, tool: ToolName, icon: str, name: str, hint: str) 
     imgui.pop_font()
     imgui.pop_style_var()
     imgui.pop_style_color(3 if is_active else 2)
-    tooltip(f"{t(command.label)} ({keys_of(editor, name)})\n{reason or t(hint)}")
+    tooltip(f"{hint_of(editor, name)}\n{reason or t(hint)}")
     if is_pressed:
         run(editor, name)
 
@@ -186,7 +186,4 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
         if i:
             imgui.same_line(0, theme.pt(4))
         imgui.set_cursor_pos_y(theme.pt(2))
-        command = COMMANDS[name]
-        hint = f"{t(command.label)} ({keys_of(editor, name)})"
-        if icon_button(icon, name, hint, command.why_not(editor), points):
-            run(editor, name)
+        command_icon(editor, name, icon, points)

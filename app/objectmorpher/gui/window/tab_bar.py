@@ -6,14 +6,13 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import COMMANDS, keys_of, run
 from ...editor.editor import Editor
 from ...editor.state import Tab
 from ...editor.view import ToolName
 from ...system.texts import t
 from ..widgets.panes import TABS, Rect, edge, pane
 from ..widgets.theme import Icon, theme
-from ..widgets.widgets import drawn_button, fitted, icon_button, small_text, tooltip
+from ..widgets.widgets import command_icon, drawn_button, fitted, icon_button, small_text, tooltip
 from .landmarks import mark
 
 WIDEST = 220.0  # points, of a tab; many are narrower, so that all are there
@@ -37,10 +36,7 @@ def draw_tabs(editor: Editor, rect: Rect) -> None:
                 _draw_tab(editor, tab, Rect(rect.x + i * width, rect.y, width, rect.height))
                 imgui.pop_id()
         imgui.set_cursor_screen_pos(ImVec2(rect.x + len(tabs) * width + theme.pt(2), rect.y))
-        hint = f"{t(COMMANDS['new_tab'].label)} ({keys_of(editor, 'new_tab')})"
-        reason = COMMANDS["new_tab"].why_not(editor)
-        if icon_button(Icon.PLUS, "new_tab", hint, reason, rect.height / theme.scale):
-            run(editor, "new_tab")
+        command_icon(editor, "new_tab", Icon.PLUS, rect.height / theme.scale)
 
 
 def _draw_tab(editor: Editor, tab: Tab, rect: Rect) -> None:

@@ -396,7 +396,7 @@ class Title:
         self._changed: tuple[Document | None, int] = (None, 0)  # px that a document changes
 
     def changed(self, editor: Editor, is_quiet: bool) -> str | None:
-        """Return the new size, or None, once a frame; `is_quiet`: nothing has happened lately."""
+        """Return another title, or None, once a frame; `is_quiet`: nothing has happened lately."""
         if is_quiet and editor.preview is None and editor.committed is not self._changed[0]:
             document = editor.committed
             count = 0 if document is None else count_changed(document, editor.cache)

@@ -71,15 +71,12 @@ def _draw_block(block: Block) -> None:
         gap(20)
         widgets.heading(block.text)
     elif block.kind is Kind.CODE:
-        imgui.push_style_color(imgui.Col_.text, theme.vec("text"))
         imgui.push_style_color(imgui.Col_.child_bg, theme.vec("raised"))
         flags = imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.always_use_window_padding
         imgui.begin_child(f"##{block.text}", ImVec2(0, 0), flags)
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_unformatted(block.text)
-        imgui.pop_text_wrap_pos()
+        widgets.wrapped_text(block.text)
         imgui.end_child()
-        imgui.pop_style_color(2)
+        imgui.pop_style_color()
     elif block.kind is Kind.ITEM:
         imgui.bullet()
         imgui.same_line()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from imgui_bundle import imgui
@@ -29,10 +30,13 @@ def draw_preferences(editor: Editor, compute: ComputeFields) -> None:
         _draw_look(editor)
         gap(16)
         heading(t("Files"))
-        _draw_files(editor)
+        kinds = (Segment(AUTO, t("The system's")), Segment("built-in", t("Built in")))
+        _draw_choice(editor, t("File dialogs"), "dialogs", kinds)
         gap(16)
         heading(t("Methods"))
-        _draw_methods(editor)
+        for stage in METHODS:
+            label(t(METHODS[stage]))
+            draw_method(editor, stage)
         gap(16)
         heading(t("Compute"))
         compute.draw(editor)
@@ -41,26 +45,21 @@ def draw_preferences(editor: Editor, compute: ComputeFields) -> None:
 
 
 def _draw_look(editor: Editor) -> None:
-    settings = editor.settings
-    label(t("Theme"))
     themes = (Segment("dark", t("Dark")), Segment("light", t("Light")))
-    _prefer(editor, "theme", segmented("theme", themes, settings.theme))
-    label(t("Text size"))
+    _draw_choice(editor, t("Theme"), "theme", themes)
     hint = t("All of the window grows with it")
     sizes = [f"{100 * scale:.0f} %" if scale else t("Auto") for scale in SCALES]
     scales = tuple(Segment(n, name, hint) for n, name in zip(SCALES, sizes, strict=True))
-    _prefer(editor, "scale", segmented("scale", scales, settings.scale))
+    _draw_choice(editor, t("Text size"), "scale", scales)
     if len(languages()) > 1:
-        label(t("Language"))
         names = tuple(Segment(code, name) for code, name in languages().items())
-        _prefer(editor, "language", segmented("language", names, settings.language))
-    label(t("Motion"))
+        _draw_choice(editor, t("Language"), "language", names)
     motions = (
         Segment(AUTO, t("As the system")),
         Segment(FULL, t("Full")),
         Segment(REDUCED, t("Reduced"), t("Nothing fades or blinks")),
     )
-    _prefer(editor, "motion", segmented("motion", motions, settings.motion))
+    _draw_choice(editor, t("Motion"), "motion", motions)
     _draw_screen(editor)
 
 
@@ -83,16 +82,10 @@ def _draw_screen(editor: Editor) -> None:
         note(t("No screen profile found: sRGB is assumed."))
 
 
-def _draw_files(editor: Editor) -> None:
-    label(t("File dialogs"))
-    kinds = (Segment(AUTO, t("The system's")), Segment("built-in", t("Built in")))
-    _prefer(editor, "dialogs", segmented("dialogs", kinds, editor.settings.dialogs))
-
-
-def _draw_methods(editor: Editor) -> None:
-    for stage in METHODS:
-        label(t(METHODS[stage]))
-        draw_method(editor, stage)
+def _draw_choice(editor: Editor, title: str, name: str, choices: Sequence[Segment]) -> None:
+    """Of the settings' field `name`."""
+    label(title)
+    _prefer(editor, name, segmented(name, choices, getattr(editor.settings, name)))
 
 
 def _prefer(editor: Editor, name: str, value: object) -> None:

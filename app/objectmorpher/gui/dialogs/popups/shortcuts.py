@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from imgui_bundle import ImVec2, imgui
 
@@ -12,7 +13,7 @@ from ....editor.shortcuts import GESTURES, Shortcuts
 from ....system.texts import t
 from ...widgets.modal import popup
 from ...widgets.theme import SMALL_SIZE, Icon, theme
-from ...widgets.widgets import Emphasis, bold_text, button, small_text, tooltip
+from ...widgets.widgets import Emphasis, bold_text, button, small_text, tooltip, wrapped_text
 
 SIZE = (880.0, 720.0)  # points
 COLUMNS = 2
@@ -52,11 +53,10 @@ class ShortcutsPopup:
 
     def _draw_columns(self, editor: Editor) -> None:
         """Groups one after the other, about as many rows in each column."""
-        groups = [(title, names) for title, names in self._groups(editor) if names]
-        gestures = [(title, rows) for title, rows in self._gestures() if rows]
-        sizes = [len(rows) + 2 for _, rows in (*groups, *gestures)]
+        groups = [(title, rows) for title, rows in self._groups(editor) if rows]
+        sizes = [len(rows) + 2 for _, rows in groups]
         half, used, column = math.ceil(sum(sizes) / COLUMNS), 0, -1
-        for i, (title, rows) in enumerate((*groups, *gestures)):
+        for i, (title, rows) in enumerate(groups):
             if column < 0 or (used + sizes[i] / 2 > half and column < COLUMNS - 1):
                 imgui.table_next_column()
                 column, used = column + 1, 0
@@ -70,20 +70,16 @@ class ShortcutsPopup:
                     _draw_gesture(*row)
             imgui.dummy(theme.size(0, 8))
 
-    def _groups(self, editor: Editor) -> list[tuple[str, list[str]]]:
-        found = []
+    def _groups(self, editor: Editor) -> Iterator[tuple[str, list[str] | list[tuple[str, str]]]]:
+        """Commands by their names, then gestures with their meanings, as far as they are meant."""
         for title, commands in GROUPS.items():
-            names = [n for n, c in commands.items() if self._is_meant(c.label, keys_of(editor, n))]
-            found.append((title, names))
-        return found
-
-    def _gestures(self) -> list[tuple[str, list[tuple[str, str]]]]:
-        found = []
+            yield (
+                title,
+                [n for n, c in commands.items() if self._is_meant(c.label, keys_of(editor, n))],
+            )
         for title, rows in GESTURES.items():
-            meant = [row for row in rows if self._is_meant(row[1], row[0])]
-            label = t("Pointer: {tool}", tool=t(title))
-            found.append((label, meant))
-        return found
+            meant = [(keys, does) for keys, does in rows if self._is_meant(does, keys)]
+            yield t("Pointer: {tool}", tool=t(title)), meant
 
     def _is_meant(self, label: str, keys: str) -> bool:
         wanted = self._filter.casefold()
@@ -128,8 +124,4 @@ def _draw_gesture(gesture: str, meaning: str) -> None:
         imgui.text_unformatted(t(gesture))
     imgui.same_line()
     imgui.set_cursor_pos_x(start + GESTURE * width)
-    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-    imgui.push_text_wrap_pos(start + width - theme.pt(12))
-    imgui.text_unformatted(t(meaning))
-    imgui.pop_text_wrap_pos()
-    imgui.pop_style_color()
+    wrapped_text(t(meaning), "secondary", start + width - theme.pt(12))
