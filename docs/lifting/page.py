@@ -28,9 +28,9 @@ the outline. The one that describes the object in the fewest words takes the pla
 surface as far as it explains it, rights how the whole leans, and gives the far side that no photo
 shows; where none does, the shape stays free. Whether the object is a flat sheet the network says
 outright; what has a handful of colours, each the same all over, is a drawing, and flat, too: no
-light falls on it. An outline that is mostly one ellipse is the rim of a plate or a bowl, and a second,
-nearer circle is the lip of a cup; where the far half of what the ellipse encloses is steep, it is
-the hole of a ring seen aslant. A handle lies in a plane through the axis of what it is on.
+light falls on it. An outline that is mostly one ellipse is the rim of a plate or a bowl, and a
+second, nearer circle is the lip of a cup; where the far half of what the ellipse encloses is steep,
+it is the hole of a ring seen aslant. A handle lies in a plane through the axis of what it is on.
 `--shape`, or Kind in the Shape panel, overrules all that.
 
 How much of the truth is that? Solids whose every view is known are drawn into a photo (512 px, 50

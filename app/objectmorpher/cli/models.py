@@ -202,11 +202,9 @@ def _look(action: str, id: str | None) -> None:
         raise UsageError(f"{', '.join(broken)}: not installed or damaged, see `models list`")
 
 
-def _name_of(found: CacheState | TrunkState | Added | HubState) -> str:
+def _name_of(found: CacheState | Added | HubState) -> str:
     if isinstance(found, CacheState):
         return found.weight.id
-    if isinstance(found, TrunkState):
-        return found.trunk.id
     return found.kind.id if isinstance(found, Added) else found.model.id
 
 
