@@ -65,15 +65,22 @@ def _contrast(picture: Picture3D, where: np.ndarray) -> float:
 
 def test_a_newly_shown_side_is_as_rough_as_the_object_itself(scene):
     plain = replace(scene.lifted, sides=None)
-    pictures = [_drawn(scene, lifted, TURN) for lifted in (plain, scene.lifted)]
-    new = (pictures[0].from_photo < 0.1) & (pictures[0].alpha > 0.99)
-    own = (pictures[0].from_photo > 0.9) & (pictures[0].alpha > 0.99)
+    bare = _drawn(scene, plain, TURN)
+    new = (bare.from_photo < 0.1) & (bare.alpha > 0.99)
+    own = (bare.from_photo > 0.9) & (bare.alpha > 0.99)
     assert new.sum() > 300
-    before, after = (_contrast(picture, new) for picture in pictures)
-    assert after > max(0.5 * _contrast(pictures[0], own), 2 * before)
+    after = []  # which patches are found is chance, that the least noise in the photo decides
+    for seed in range(6):
+        noise = np.random.default_rng(seed).normal(0, 1e-4, scene.matte.foreground.shape)
+        noisy = (scene.matte.foreground + noise).clip(0, 1).astype(np.float32)
+        matte = replace(scene.matte, foreground=noisy)
+        lifted = with_sides(plain, matte, scene.camera, seed)
+        after.append(_contrast(_drawn(scene, lifted, TURN), new))
+    assert np.mean(after) > max(0.5 * _contrast(bare, own), 2 * _contrast(bare, new))
     # Nothing of it counts as the photo's, and the outline is what it was.
-    assert pictures[1].from_photo[new].mean() < 0.1
-    assert np.abs(pictures[1].alpha - pictures[0].alpha).mean() < 0.02
+    picture = _drawn(scene, scene.lifted, TURN)
+    assert picture.from_photo[new].mean() < 0.1
+    assert np.abs(picture.alpha - bare.alpha).mean() < 0.02
 
 
 @pytest.mark.parametrize("yaw", [30.0, -30.0, 45.0])
