@@ -81,8 +81,12 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     from .compose.light.grain import Grain, sketch_grain
     from .compose.light.noise import BANDS, find_noise
     from .compose.light.relight import Relit
+    from .lift.relief.integration import solved
     from .pipeline import lift_mask, make_plate
+    from .segment.matting.closed_form import affine
 
+    empty = np.zeros((4, 4))
+    solved(empty, empty, empty, empty, empty, empty, 1, 1.0)  # after the shape network's look
     small = np.zeros((4, 4), np.float32)
     clear = np.zeros((4, 4, 4), np.uint8)
     Relit(small, 0.0, 0.0, 1.0).lit_rgba(clear, 0.0, 0.0, 1.0)
@@ -94,6 +98,7 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
         grain.grained(np.zeros((4, 4, 3), np.float32), small, 0, 0)
         splats = puppet.posed(thing.pose, Placement(scale=1.3))
         sketch_grain(splats, noise, 1.0, document.photo.camera)
+    affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
     deep = document.photo.pixels.astype(np.uint16) * np.uint16(257)
     assert thing.mask is not None and thing.matte is not None
     make_plate(deep, thing.mask)

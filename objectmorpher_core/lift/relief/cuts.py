@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.arrays import F64, I64, Mask
 from ...base.poisson_disk import nearest_in
-from .integration import solved
+from .integration import CLOSE, ROUNDS, solved
 
 STEEP = 1.5  # height per length across, from which a front may be cut
 LEAST_JUMP = 0.02  # x extent, over which a cut falls
@@ -47,7 +47,8 @@ class Cuts:
         right = (inside[:, 1:] & inside[:, :-1] & ~self.right).astype(np.float64)
         none = np.zeros(field.shape)
         weights = np.pad(down, ((0, 1), (0, 0))), np.pad(right, ((0, 0), (0, 1)))
-        change = solved(field, HELD * held, (none, none), weights)
+        start = np.ascontiguousarray(field)  # the kernel is compiled for that
+        change = solved(start, HELD * held, none, none, *weights, ROUNDS, CLOSE)
         return np.where(near & inside, field + change, field)
 
     def beside(self) -> Mask:

@@ -9,10 +9,9 @@ pixel's ray, in which a tangent plane seen in perspective is linear (Queau, Duro
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import cg
 
 from ...base.arrays import F32, F64, Mask
+from ...base.kernel_files import numba
 
 SLOPE_ERROR = 0.25  # expected, of the normals: change of depth per length across the ray
 GRAZING = 0.2  # cosine to the ray, below which a normal shows no slope
@@ -31,9 +30,12 @@ def integrated(
     """
     start = np.log(np.maximum(distance, 1e-6))
     sure = np.where(mask, (distance / np.maximum(error, 1e-4)) ** 2, 0.0)
-    down, right = (_steps(normal, edge, rays, mask, axis) for axis in (0, 1))
-    size = (SLOPE_ERROR * step) ** 2
-    change = solved(start, sure, (down[0], right[0]), (down[1] / size, right[1] / size))
+    slopes, weights = [], []
+    for axis in (0, 1):
+        slope, weight = _steps(normal, edge, rays, mask, axis)
+        slopes.append(slope)
+        weights.append(weight / (SLOPE_ERROR * step) ** 2)
+    change = solved(start, sure, slopes[0], slopes[1], weights[0], weights[1], ROUNDS, CLOSE)
     return np.where(mask, np.exp(start + change), distance)
 
 
@@ -58,28 +60,62 @@ def _steps(normal: F32, edge: F32, rays: F64, mask: Mask, axis: int) -> tuple[F6
     return slope, weight
 
 
-def solved(
-    start: F64, sure: F64, slopes: tuple[F64, F64], weights: tuple[F64, F64], rounds: int = ROUNDS
-) -> F64:
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _applied(x, sure, down, right, out):
+    """`out` (h, w): the system's matrix times x (h, w)."""
+    height, width = x.shape
+    for i in range(height):
+        for j in range(width):
+            total = sure[i, j] * x[i, j]
+            if i + 1 < height:
+                total += down[i, j] * (x[i, j] - x[i + 1, j])
+            if i > 0:
+                total += down[i - 1, j] * (x[i, j] - x[i - 1, j])
+            if j + 1 < width:
+                total += right[i, j] * (x[i, j] - x[i, j + 1])
+            if j > 0:
+                total += right[i, j - 1] * (x[i, j] - x[i, j - 1])
+            out[i, j] = total
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def solved(start, sure, slope_down, slope_right, down, right, rounds, close):
     """(h, w) what is to be added to `start`, so that its steps are near the slopes.
 
-    `sure`: weights (h, w) of keeping `start`. `slopes` and their `weights`: (h, w) each, of the
-    steps to the next row and column. Conjugate gradients, scaled by the diagonal.
+    `sure`: weights (h, w) of keeping `start`. `down`, `right`: weights (h, w) of the steps to the
+    next row and column. Conjugate gradients, scaled by the diagonal.
     """
-    index = np.arange(start.size).reshape(start.shape)
-    first = np.concatenate([index[:-1].ravel(), index[:, :-1].ravel()])
-    last = np.concatenate([index[1:].ravel(), index[:, 1:].ravel()])
-    wanted, weight = (
-        np.concatenate([down[:-1].ravel(), right[:, :-1].ravel()])
-        for down, right in (slopes, weights)
-    )
-    count, values = len(first), start.ravel()
-    ends, rows = np.column_stack([last, first]).ravel(), np.arange(0, 2 * count + 1, 2)
-    steps = csr_array((np.tile([1.0, -1.0], count), ends, rows), (count, start.size))
-    pulls = steps.T.tocsr() * weight
-    # In single precision no library spreads the many short sums over threads that wait for others.
-    system = (pulls @ steps + diags_array(sure.ravel())).astype(np.float32)
-    right = (pulls @ (wanted - steps @ values)).astype(np.float32)
-    scale = diags_array(1 / np.maximum(system.diagonal(), 1e-30))
-    change, _ = cg(system, right, rtol=CLOSE, maxiter=rounds, M=scale)
-    return change.reshape(start.shape).astype(np.float64)
+    height, width = start.shape
+    x, ax = np.zeros((height, width)), np.zeros((height, width))
+    residual, diagonal = np.zeros((height, width)), np.zeros((height, width))
+    for i in range(height):
+        for j in range(width):
+            diagonal[i, j] += sure[i, j]
+            if i + 1 < height:
+                pull = down[i, j] * (slope_down[i, j] - (start[i + 1, j] - start[i, j]))
+                residual[i, j] -= pull
+                residual[i + 1, j] += pull
+                diagonal[i, j] += down[i, j]
+                diagonal[i + 1, j] += down[i, j]
+            if j + 1 < width:
+                pull = right[i, j] * (slope_right[i, j] - (start[i, j + 1] - start[i, j]))
+                residual[i, j] -= pull
+                residual[i, j + 1] += pull
+                diagonal[i, j] += right[i, j]
+                diagonal[i, j + 1] += right[i, j]
+    scale = 1 / np.maximum(diagonal, 1e-30)
+    way = scale * residual
+    size = (residual * way).sum()
+    first = size
+    for _ in range(rounds):
+        if size <= close * close * first or size <= 0.0:
+            break
+        _applied(way, sure, down, right, ax)
+        along = size / (way * ax).sum()
+        x += along * way
+        residual -= along * ax
+        scaled = scale * residual
+        after = (residual * scaled).sum()
+        way = scaled + after / size * way
+        size = after
+    return x

@@ -34,7 +34,7 @@ EVENED = 0.1  # x its radius: so far from its rim it becomes the rim's circle
 AMID = 0.5  # x the arch's height, from where on thickness is compared
 LEAST_KNOWN = 60  # cells on rims
 PULL = 100.0  # x a step's weight, that a place on a rim has
-ROUNDS = 300  # of conjugate gradients
+SOLVING = 300, 1e-4  # rounds of conjugate gradients, and when the residual is small enough
 DISH = 0.07, 0.05  # x its radius: how deep a dish is, and how thick
 FEET, BULGES = (0.35, 0.5, 0.65, 0.8, 0.95), (1.0, 0.5, 0.25)  # x the lip's radius; exponents
 BAND = 0.06  # x the lip's radius, within which a vessel ends at the photo's edge
@@ -73,8 +73,7 @@ def laid(
         np.pad(inside[1:] * inside[:-1], ((0, 1), (0, 0))),
         np.pad(inside[:, 1:] * inside[:, :-1], ((0, 0), (0, 1))),
     )
-    pulled = PULL * known.astype(np.float64)
-    rest = rest + solved(rest, pulled, (zero, zero), steps, ROUNDS)
+    rest = rest + solved(rest, PULL * known, zero, zero, *steps, *SOLVING)
     after = before + whole + rest.ravel()[nearest_in(outline.inside)]
     after += float(np.median((before - after)[outline.inside]))
     body = replace(body, middle=body.middle + np.exp(before) - np.exp(after))

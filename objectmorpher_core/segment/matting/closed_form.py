@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import cg
 
 from ...base.arrays import F32, I32, Mask
 from ...base.kernel_files import numba
@@ -49,11 +47,8 @@ def solve_alpha(rgb: F32, unknown: Mask, expected: Expected, start: F32, rounds:
     neighbours = np.empty(matrix.shape, np.int32)
     _take_known(index, alpha, matrix, right, neighbours)
     matrix[:, matrix.shape[1] // 2] += weight
-    ends = np.arange(0, matrix.size + 1, matrix.shape[1], dtype=np.int32)
-    system = csr_array((matrix.ravel(), neighbours.ravel(), ends))
-    scale = diags_array(1 / matrix[:, matrix.shape[1] // 2])
-    first = start.ravel()[place].astype(np.float32)
-    solved, _ = cg(system, right, first, rtol=TOLERANCE, maxiter=rounds, M=scale)
+    solved = start.ravel()[place].astype(np.float32)
+    _conjugate_gradients(matrix, neighbours, right, solved, rounds)
     alpha.ravel()[place] = np.clip(solved, 0, 1)
     return alpha
 
@@ -145,6 +140,51 @@ def _take_known(index: I32, alpha: F32, matrix: F32, right: F32, neighbours: I32
                 else:
                     right[row] -= matrix[row, entry] * alpha[i, j]
                     matrix[row, entry] = 0
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _conjugate_gradients(
+    matrix: F32, neighbours: I32, right: F32, x: F32, rounds: int
+) -> None:  # fmt: skip
+    """Improves `x` (N,), preconditioned with the diagonal, until it hardly changes any more."""
+    count = len(x)
+    residual, step, along = np.empty_like(x), np.zeros_like(x), np.empty_like(x)
+    before, enough = 1.0, 0.0
+    _times(matrix, neighbours, x, along)
+    for i in range(count):
+        residual[i] = right[i] - along[i]
+        enough += float(right[i]) ** 2
+    enough *= TOLERANCE**2
+    for turn in range(rounds):
+        length = now = 0.0
+        for i in range(count):
+            length += float(residual[i]) ** 2
+            now += float(residual[i]) ** 2 / matrix[i, 12]
+        if length <= enough or now == 0.0:
+            return
+        keep = np.float32(now / before) if turn else np.float32(0)
+        for i in range(count):
+            step[i] = residual[i] / matrix[i, 12] + keep * step[i]
+        _times(matrix, neighbours, step, along)
+        slope = 0.0
+        for i in range(count):
+            slope += float(step[i]) * float(along[i])
+        if slope <= 0.0:  # rounding: nothing to be gained any more
+            return
+        go = np.float32(now / slope)
+        for i in range(count):
+            x[i] += go * step[i]
+            residual[i] -= go * along[i]
+        before = now
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _times(matrix: F32, neighbours: I32, x: F32, product: F32) -> None:
+    for row in range(len(x)):
+        total = np.float32(0)
+        for entry in range(25):
+            total += matrix[row, entry] * x[neighbours[row, entry]]
+        product[row] = total
 
 
 def affine(rgb: F32, alpha: F32) -> F32:
