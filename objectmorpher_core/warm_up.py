@@ -34,6 +34,7 @@ from .raster.surface import draw_layers
 from .raster.texture import build_levels
 
 SIZE = 96  # px
+NODES = 8  # unknowns of a made system
 FEW_SURFELS, FEW_PIXELS = 30, 8  # with which every rotation is tried in a moment
 
 
@@ -111,8 +112,11 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
 
 
 def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
-    """Strain as a colour, Gaussians split, the paper as printed."""
+    """Strain as a colour, Gaussians split, the paper as printed, thousands of control points."""
+    from scipy.sparse import csr_array
+
     from .compose.composite import object_texture
+    from .deform.response import SparseResponse
 
     assert thing.pose is not None and thing.matte is not None
     puppet.deformer.strain(thing.pose)
@@ -124,6 +128,7 @@ def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
         other = Puppet(puppet.lifted, settings, camera)
         solution = other.deformer.solve(thing.handles)
         other.draw(solution.pose, Placement(), texture, camera)
+    SparseResponse(csr_array(np.eye(NODES))).solve(np.ones((NODES, 3)))
 
 
 def _register(document: Document, thing: EditObject) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import F64
+from ..base.arrays import F64, frozen
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 
 WINDOW = 12  # previous steps that are combined
 RIDGE = 1e-12  # on the normalised Gram matrix of the steps: float64 squared leaves no more
@@ -43,8 +45,9 @@ class Anderson:
         size = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
         gram /= size[:, None] * size
         gram.flat[:: self._count + 1] += RIDGE
-        shares = np.linalg.solve(gram, _products(steps, flat_residual) / size) / size
-        mixed = flat_value - np.einsum("k,kn->n", shares, self._values[: self._count])
+        shares = solve_small(gram, _products(steps, flat_residual) / size) / size
+        mixed = np.empty(flat_value.size)
+        _less(frozen(flat_value), frozen(self._values), shares, mixed)
         return mixed.reshape(value.shape)
 
     def _keep(self, value: F64, residual: F64) -> None:
@@ -58,4 +61,63 @@ class Anderson:
 
 def _products(rows: F64, column: F64) -> F64:
     """rows (k, n) times column (n,), in this thread: BLAS would wake others for it."""
-    return np.einsum("kn,n->k", rows, column)
+    out = np.empty(len(rows))
+    _multiply(frozen(rows), frozen(column), out)
+    return out
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _multiply(rows, column, out):
+    for k in range(len(rows)):
+        total = 0.0
+        for i in range(len(column)):
+            total += rows[k, i] * column[i]
+        out[k] = total
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _less(value, rows, shares, out):
+    """out := value - sum_k shares_k rows_k."""
+    for i in range(len(value)):
+        out[i] = value[i]
+    for k in range(len(shares)):
+        for i in range(len(value)):
+            out[i] -= shares[k] * rows[k, i]
+
+
+# Small dense systems: for a dozen unknowns calling LAPACK takes longer than solving.
+
+FEW = 48  # unknowns up to which it is quicker
+
+
+def solve_small(matrix: F64, right: F64) -> F64:
+    """x (n,) of matrix (n, n) x = right (n,), by elimination with the largest pivot of a column."""
+    if len(right) > FEW:
+        return np.asarray(np.linalg.solve(matrix, right), np.float64)
+    x = right.copy()
+    _eliminate(frozen(matrix), x)
+    return x
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _eliminate(matrix, x):
+    a, count = matrix.copy(), len(x)
+    for k in range(count):
+        pivot = k
+        for i in range(k + 1, count):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if pivot != k:
+            x[k], x[pivot] = x[pivot], x[k]
+            for j in range(k, count):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, count):
+            share = a[i, k] * inverse
+            x[i] -= share * x[k]
+            for j in range(k + 1, count):
+                a[i, j] -= share * a[k, j]
+    for k in range(count - 1, -1, -1):
+        for j in range(k + 1, count):
+            x[k] -= a[k, j] * x[j]
+        x[k] /= a[k, k]

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 
 from ..base.arrays import F64, I32, Sparse
-from .anderson import Anderson
+from .anderson import Anderson, solve_small
 from .constraints import Constraints, HeldResponse, StiffnessPatch, Targets, followed
 from .links import Links, in_single
 from .prestress import full_prestress, least_prestress
@@ -276,7 +276,7 @@ class ArapSolver:
         blended = self._constraints.blended  # the others have none
         excess = self._constraints.excess(bends, turned, positions)[blended]
         system = followed(bends[blended], self._parting)
-        excess = np.asarray(np.linalg.solve(system, excess.ravel()), np.float64).reshape(-1, 3)
+        excess = solve_small(system, excess.ravel()).reshape(-1, 3)
         positions -= product(self._follow, excess)
 
     def _fit_bodies(self, positions: F64, rotations: F64) -> tuple[Pivot, ...]:

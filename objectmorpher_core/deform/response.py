@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cholesky, get_lapack_funcs
-from scipy.sparse import csc_array, eye_array
+from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import F64, Sparse, frozen
@@ -66,31 +66,57 @@ class DenseResponse:
 
 
 class SparseResponse:
-    """L U of K in an order of minimum degree, by SuperLU without pivoting."""
+    """L D L^T of a reordered K (minimum degree, by SuperLU without pivoting)."""
 
     def __init__(self, matrix: Sparse) -> None:
-        count = matrix.shape[0]
         top = float(matrix.diagonal().max(initial=0.0)) or 1.0
-        self._factor = splu(
-            csc_array(matrix + JITTER * 1e-4 * top * eye_array(count)),
+        factor = splu(
+            csc_array(matrix + JITTER * 1e-4 * top * _identity(matrix.shape[0])),
             permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True},
         )  # fmt: skip
-        self._count = count
+        assert np.array_equal(factor.perm_r, factor.perm_c), "K is symmetric: no pivoting"
+        self._order = np.argsort(factor.perm_c)  # unknown at each row of the factor
+        self._pivots = frozen(1.0 / factor.U.diagonal())
+        self._lower = _triangle(csr_array(factor.L))
+        # From its end backwards, L^T is lower triangular too.
+        self._upper = _triangle(csr_array(factor.L.T[::-1, ::-1]))
         self._columns: dict[int, F64] = {}
 
     def solve(self, forces: F64) -> F64:
-        return self._factor.solve(forces)
+        x = np.ascontiguousarray(forces[self._order])
+        _substitute(*self._lower, x)
+        x = np.ascontiguousarray((x * self._pivots[:, None])[::-1])
+        _substitute(*self._upper, x)
+        out = np.empty(x.shape)
+        out[self._order] = x[::-1]
+        return out
 
     def columns(self, nodes: np.ndarray) -> F64:
-        """Solved once and remembered: the next handle set shares most of them."""
+        """Solved three at a time and remembered: the next handle set shares most of them."""
         new = [int(n) for n in np.unique(nodes) if int(n) not in self._columns]
-        unit = np.zeros((self._count, len(new)))
-        unit[new, np.arange(len(new))] = 1.0
-        if new:
-            self._columns |= dict(zip(new, self.solve(unit).T, strict=True))
+        for first in range(0, len(new), 3):
+            own = new[first : first + 3]
+            unit = np.zeros((len(self._order), 3))
+            unit[own, np.arange(len(own))] = 1.0
+            self._columns |= dict(zip(own, self.solve(unit).T, strict=False))
         if len(nodes) == 0:
-            return np.empty((self._count, 0))
+            return np.empty((len(self._order), 0))
         return np.stack([self._columns[int(n)] for n in nodes], axis=1)
+
+
+def _identity(count: int) -> Sparse:
+    steps = np.arange(count + 1)
+    return csr_array((np.ones(count), steps[:-1], steps), shape=(count, count))
+
+
+def _triangle(matrix: Sparse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row starts, columns and values without the unit diagonal."""
+    matrix.setdiag(0.0)
+    matrix.eliminate_zeros()
+    matrix.sort_indices()
+    return (
+        frozen(matrix.indptr, np.uint32), frozen(matrix.indices, np.uint32), frozen(matrix.data)
+    )  # fmt: skip
 
 
 def product(matrix: F64, columns: F64) -> F64:
@@ -166,3 +192,18 @@ def _symmetric_product(matrix, x, y):
                 own += matrix[i, k] * x[c, k]
                 y[c, k] += matrix[i, k] * x[c, i]
             y[c, i] += own
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _substitute(starts, columns, values, x):
+    """x := L^-1 x, L unit lower triangular by rows without its diagonal, x (n, 3)."""
+    for i in range(len(x)):
+        a = b = c = 0.0
+        for e in range(starts[i], starts[i + 1]):
+            j, v = columns[e], values[e]
+            a += v * x[j, 0]
+            b += v * x[j, 1]
+            c += v * x[j, 2]
+        x[i, 0] -= a
+        x[i, 1] -= b
+        x[i, 2] -= c
