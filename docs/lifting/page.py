@@ -174,7 +174,7 @@ chosen, changes little: it had no such band. A quokka, lit from behind, got a pa
 a fringe that is lighter than what lies inside it was taken for as deep as before. Eight solids,
 whose edges are crisp (box, domino, card, mug, brick, cup, ring, vase), come out 0.1 dB higher of a
 pitch by 20 degrees, 0.1 lower of a turn by 20 and the same of one by 35; the domino loses 1.0 dB to
-one side. The tables above are of the version before.
+one side.
 
 A mask that was drawn around hair takes in the background between it, which stood beside a turned
 head as a shell. Where the mask lies on no edge of the picture and colours agree, the matte is now

@@ -408,15 +408,15 @@ class HandleNumbers:
     def move(self, x: float, y: float, depth: float) -> None:
         """Previews the handle at image px, so many diameters farther than at rest."""
         editor = self._editor
-        point = editor.chosen.handles[self._h].point
+        point = editor.chosen.handles[self._handle].point
         rest = editor.derived.spot(editor.opened, editor.current, point)
         there = rest.moved(np.zeros(2), depth)
-        self._posing.drag(self._h, replace(there, xy=np.array([x, y])))
+        self._posing.drag(self._handle, replace(there, xy=np.array([x, y])))
 
     def turn(self, degrees: float) -> None:
         """Previews the handle turned so far about the line of sight."""
-        more = np.radians(degrees) - self._roll(self._h)
-        self._posing.turn(self._h, self._posing.turn_of(self._h), more * SIGHT)
+        more = np.radians(degrees) - self._roll(self._handle)
+        self._posing.turn(self._handle, self._posing.turn_of(self._handle), more * SIGHT)
 
     def soften(self, softness: float) -> None:
         """Previews the handle giving way from now on: 0 = not at all."""
@@ -424,7 +424,7 @@ class HandleNumbers:
 
     def set_free(self, is_free: bool) -> None:
         """Whether it turns as the object does, or stays as it is turned now; one step."""
-        self._hold(edits.turn_handle, None if is_free else self._posing.turn_of(self._h))
+        self._hold(edits.turn_handle, None if is_free else self._posing.turn_of(self._handle))
         self._posing.finish(t("Free handle's turn") if is_free else t("Hold handle's turn"))
 
     def set_pin(self, is_pin: bool) -> None:
@@ -433,7 +433,7 @@ class HandleNumbers:
         self._posing.finish(t("Make it a pin") if is_pin else t("Make it a handle"))
 
     @property
-    def _h(self) -> int:
+    def _handle(self) -> int:
         """The handle, for whatever is done only where its numbers are shown."""
         assert self._posing.handle is not None
         return self._posing.handle
@@ -441,4 +441,4 @@ class HandleNumbers:
     def _hold(self, edit: Callable[..., Document], value: object) -> None:
         """Previews the handle after an edit of it."""
         editor = self._editor
-        self._posing.hold(edit(editor.opened, editor.current, self._h, value))
+        self._posing.hold(edit(editor.opened, editor.current, self._handle, value))

@@ -31,7 +31,7 @@ class Trunk:
     """An official network, one file, which the user brings."""
 
     name: str
-    files: tuple[str, ...]  # published names, which tell the first digits of the SHA-256
+    files: tuple[str, ...]  # published names, which hold the first digits of the SHA-256
 
     def check(self, path: Path, sha256: str) -> None:
         """Raises EvaluationError where a file is not what its name says; safetensors have none."""
