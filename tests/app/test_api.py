@@ -109,7 +109,7 @@ def test_a_script_file_is_the_command_lines(folder):
     assert edit.render().encode() == Path("cli.png").read_bytes()
 
 
-def test_a_photo_may_be_a_path_bytes_an_array_or_an_image_of_pillow(folder):
+def test_a_photo_may_be_a_path_bytes_an_array_or_an_image_of_pillow(folder, networks):
     wide = PIXELS.astype(np.uint16) * 257
     alpha = np.where(MASK, 255, 60).astype(np.uint8)
     image = Image.open(folder / "photo.png")

@@ -127,9 +127,11 @@ def test_clicks_before_the_first_answer_are_one(editor: Editor) -> None:
 @pytest.mark.parametrize("is_late", [False, True])
 @pytest.mark.parametrize("is_subject", [False, True])
 def test_what_is_painted_before_an_answer_comes_is_kept_beside_it(
-    editor: Editor, is_late: bool, is_subject: bool
+    editor: Editor, is_late: bool, is_subject: bool, request: pytest.FixtureRequest
 ) -> None:
     """`is_late`: the answer comes during the stroke."""
+    if is_subject:
+        request.getfixturevalue("networks")  # nothing else knows a subject
 
     def ask() -> None:
         if is_subject:
