@@ -103,9 +103,9 @@ LEAST_GAIN = 1.2  # x spacing: with less, thinning is not worth it
 def thinned(lifted: LiftedObject, count: int) -> tuple[LiftedObject, I32] | None:
     """About `count` of the solid Gaussians, so much wider, and which ones; None for a small object.
 
-    The soft edge stays as it is: its Gaussians are few and each is seen by itself.
+    The soft edge and hair stay as they are: each of their Gaussians is seen by itself.
     """
-    is_solid = lifted.texture.solidity > 0.5
+    is_solid = (lifted.texture.solidity > 0.5) & ~lifted.is_hair
     solid = np.flatnonzero(is_solid)
     gain = float(np.sqrt(len(solid) / count))
     if gain < LEAST_GAIN:

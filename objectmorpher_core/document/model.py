@@ -187,6 +187,7 @@ class LiftSettings:
 AS_SEEN = LiftSettings()
 
 # see raster/rules.py
+HAIR, EXACT = 0.998, 5e-4  # opacity of a relief's strands of hair: all else of it has 1
 SPLATTINGS = ("surface", "solid", "edged surface", "edged solid", "mip", "classic")
 
 
@@ -236,14 +237,20 @@ class LiftedObject:
 
     @cached_property
     def body(self) -> Gaussians:
-        """The Gaussians that are the object itself, not its soft edge."""
+        """The Gaussians that are the object itself, neither its soft edge nor its hair."""
         return self.gaussians.select(self.is_body)
 
     @cached_property
     def is_body(self) -> Mask:
         """(N,) which Gaussians those are: all, where none is solid."""
         is_solid = self.texture.solidity > 0.5
-        return is_solid if is_solid.any() else np.ones(len(is_solid), bool)
+        return is_solid & ~self.is_hair if is_solid.any() else np.ones(len(is_solid), bool)
+
+    @cached_property
+    def is_hair(self) -> Mask:
+        """(N,) which Gaussians are strands on its sides."""
+        is_relief = self.splatting.startswith("edged")
+        return is_relief & (np.abs(self.gaussians.opacities - HAIR) < EXACT)
 
     @cached_property
     def scale(self) -> float:
@@ -253,7 +260,7 @@ class LiftedObject:
     @cached_property
     def centre(self) -> F64:
         """(3,) world; centre of the bounding box in camera axes at rest."""
-        points = self.world_points(self.gaussians.means)
+        points = self.world_points(self.gaussians.means[~self.is_hair])
         return frozen(0.5 * (points.min(0) + points.max(0)))
 
     def world_points(self, points: np.ndarray) -> F64:

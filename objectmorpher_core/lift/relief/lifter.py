@@ -49,6 +49,7 @@ from .mirror import MirrorAxis, find_axis
 from .sides import with_sides
 from .silhouette import ReliefSilhouette, solid_part
 from .spreading import SurfacePoints, spread
+from .strands import with_strands
 
 TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
@@ -126,7 +127,9 @@ class ReliefLifter:
         invents = body.behind is None  # else what it hides has the colours of what is like it
         if settings.views:
             return with_views(lifted, matte, camera, settings.views, seed, invents)
-        return with_sides(lifted, matte, camera, seed) if invents else lifted
+        if not invents:
+            return lifted
+        return with_strands(with_sides(lifted, matte, camera, seed), matte, camera, seed)
 
     def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:
         """The shape alone, on which `lift` spreads its Gaussians."""
