@@ -336,12 +336,12 @@ def grey_plate(inside: Mask, margin: int = 1) -> Plate:
     return Plate(0, 0, np.full((*inside.shape, 3), 128, np.uint8), hole, "made")
 
 
-def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
+def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0, kind: str = "auto") -> Scene:
     """`inside` of the photo `pixels` lifted by the relief, to about `count` Gaussians."""
     height, width = inside.shape
     view = camera(width, height)
-    settings = LiftSettings(count, trust=0)
-    said = repr(("lifted scene", inside.shape, count, seed)).encode()
+    settings = LiftSettings(count, trust=0, kind=kind)
+    said = repr(("lifted scene", inside.shape, count, seed, kind)).encode()
     matte, lifted = remembered.once(
         said + pixels.tobytes() + inside.tobytes(),
         lambda: lift_mask(pixels, view, inside, "relief", settings, seed=seed),

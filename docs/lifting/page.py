@@ -176,6 +176,20 @@ whose edges are crisp (box, domino, card, mug, brick, cup, ring, vase), come out
 pitch by 20 degrees, 0.1 lower of a turn by 20 and the same of one by 35; the domino loses 1.0 dB to
 one side.
 
+A side that turns into view is smooth, and hair ended there as clay does, in a hard, wavy line. Now
+strands are rooted on it, thin Gaussians as long as the photo's own hair is soft, as many as its
+outline is ragged, and in the side's colours. What is ragged is seen by the matte: across a smooth
+edge alpha changes along its normal alone, however soft the edge is, and where hair ends from strand
+to strand. Of 37 things in photographs that is so at 10 to 89 % of the outline of animals, people
+and plush, at 0 to 15 % of a duck, a tin, a teapot, a vase, a clock, a bag and two lamps and toys;
+but also at 26 to 47 % of a boot with fringes, a jar of glass, another toy before a rock, and
+vehicles before busy grounds, which get strands that they have not. One does not see them at a
+glance. None of the twenty solids gets any. At rest they are not seen, they are no part of the body,
+and an object that has some takes up to a third longer to draw. Lengths and directions were chosen
+on a chow, a corgi and a man's curls, at 25 degrees: the dogs gain most, short coats and plush a
+little, and long human hair, which falls in curves, hardly anything. What looks the same from behind
+(a wolf, a dachshund seen from the side) has no sides of its own and keeps its smooth outline.
+
 A mask that was drawn around hair takes in the background between it, which stood beside a turned
 head as a shell. Where the mask lies on no edge of the picture and colours agree, the matte is now
 looked for three times as far from it, and the body ends where the object is solid; the brim carries

@@ -24,6 +24,7 @@ from ...raster.posed import RestSplats
 from .canvas import bilinear
 
 LARGEST = 1000  # px, root of the area of the object as its edge is looked at
+COARSE = 4  # of these px to one of the grid on which that is summed up
 MIXED, CRISP = (0.03, 0.97), 1.0  # alpha of what is soft; px of that across an edge as crisp as any
 AROUND = 0.03  # x the root of the area, along the outline: what is alike
 ALONG = 0.006  # x the root of the area: an edge without its strands
@@ -31,14 +32,14 @@ ALONG = 0.006  # x the root of the area: an edge without its strands
 # plastic 0.1 to 0.25, of plush and fur 0.2 to 0.7.
 SMOOTH, RAGGED = 0.26, 0.5
 SOFTEST = 0.004  # x the root of the area: what is less soft has no hair that one sees
-LENGTH, LONGEST = 4.5, 0.035  # of a strand: x what is soft; x the root of the area, at most
+LENGTH, LONGEST = 4.5, 0.03  # of a strand: x what is soft; x the root of the area, at most
 VARIED = 0.6, 1.3  # x that
-THICKNESS, THINNEST = 0.022, 0.5  # standard deviation: x its length; px, at least
+THICKNESS, THINNEST = 0.02, 0.4  # standard deviation: x its length; px, at least
 TAPERED = 2.2  # standard deviations in a strand
 AREA = 0.025  # x its length squared, of surface for each
-MOST = 6_000  # strands
-TURNED = -0.65, 0.02  # cosines at rest, between which the outline of a turned object lies
-STRAY, LYING, STANDING = 0.5, (50.0, 85.0), (10.0, 50.0)  # share of strands; degrees to the normal
+MOST = 8_000  # strands
+TURNED = -0.65, 0.0  # cosines at rest, between which the outline of a turned object lies
+LEANING = 38.0, 75.0  # degrees to the normal
 DOWN, WAVY, LOOSE = 0.4, 0.35, 0.35  # what their directions are made of
 WAVE = 6.0  # radians per object unit
 ROOT = 0.25  # x a strand's length, from its root to its middle: the rest is in the surface
@@ -69,12 +70,12 @@ def hair_of(alpha: F32) -> Hair | None:
     scale = min(1.0, LARGEST / max(area, 1.0))
     size = max(1, round(alpha.shape[1] * scale)), max(1, round(alpha.shape[0] * scale))
     small = np.asarray(cv2.resize(alpha, size, interpolation=cv2.INTER_AREA), np.float32)
-    solid = (small > 0.5).astype(np.uint8)
+    broad = cv2.GaussianBlur(small, (0, 0), max(ALONG * scale * area, 1e-3))
+    solid = (broad > 0.5).astype(np.uint8)
     edge = cv2.morphologyEx(solid, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     if not edge.any():
         return None
     soft = (small > MIXED[0]) & (small < MIXED[1])
-    broad = cv2.GaussianBlur(small, (0, 0), ALONG * scale * area)
     slope, way = (
         np.stack([cv2.Scharr(field, cv2.CV_32F, 1, 0), cv2.Scharr(field, cv2.CV_32F, 0, 1)])
         for field in (small, broad)
@@ -83,15 +84,18 @@ def hair_of(alpha: F32) -> Hair | None:
     across, along = slope[0] * way[0] + slope[1] * way[1], slope[0] * way[1] - slope[1] * way[0]
     is_edge = (broad > MIXED[0]) & (broad < MIXED[1])
     fields = soft, 0.5 * edge, is_edge * along**2, is_edge * across**2  # both sides are in `edge`
-    width, length, uneven, even = (
-        cv2.GaussianBlur(np.asarray(field, np.float32), (0, 0), AROUND * scale * area)
+    size = max(1, size[0] // COARSE), max(1, size[1] // COARSE)
+    coarse = [
+        cv2.resize(np.asarray(field, np.float32), size, interpolation=cv2.INTER_AREA)
         for field in fields
-    )
+    ]
+    sigma = max(AROUND * scale * area / COARSE, 1e-3)
+    width, length, uneven, even = (cv2.GaussianBlur(field, (0, 0), sigma) for field in coarse)
     softness = (width / np.maximum(length, 1e-3) - CRISP) / scale
     ratio = np.sqrt(uneven / np.maximum(even, 1e-9))
     ragged = ((ratio - SMOOTH) / (RAGGED - SMOOTH)).clip(0, 1)
-    nearest = nearest_in(edge > 0)
-    return Hair(softness.ravel()[nearest], ragged.ravel()[nearest], scale)
+    nearest = nearest_in(coarse[1] > 0)
+    return Hair(softness.ravel()[nearest], ragged.ravel()[nearest], size[0] / alpha.shape[1])
 
 
 def with_strands(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
@@ -161,9 +165,7 @@ class _Growth:
         lying = DOWN * axes[1] + LOOSE * rng.normal(size=(count, 3))
         lying += WAVY * np.sin(WAVE * root @ rng.normal(size=(3, 3))) @ rng.normal(size=(3, 3))
         lying = _unit(lying - (lying * normal).sum(1, keepdims=True) * normal)
-        is_stray = rng.random(count) < STRAY
-        lean = np.where(is_stray, rng.uniform(*STANDING, count), rng.uniform(*LYING, count))
-        lean = np.radians(lean)[:, None]
+        lean = np.radians(rng.uniform(*LEANING, count))[:, None]
         way = np.cos(lean) * normal + np.sin(lean) * lying
         length = self.length * rng.uniform(*VARIED, count)
         beside = lifted.spacing * rng.uniform(-0.5, 0.5, (count, 2))
