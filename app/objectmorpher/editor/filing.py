@@ -405,6 +405,6 @@ class SampleOpening:
             return True
         elif editor.is_lifted:
             assert editor.history is not None
-            editor.history.mark_saved(document)  # the artist has done nothing yet
+            editor.history.mark_saved()  # the artist has done nothing yet
             self._photo = None
         return False

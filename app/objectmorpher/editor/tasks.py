@@ -456,11 +456,11 @@ class Tasks:
         editor, tab, history = self._editor, self._editor.tab, self._editor.history
         if history is None:
             return
-        document = history.document
+        step = history.step
 
         def accept(_: None) -> None:
             if tab.history is history:  # which may not be the tab that is shown by now
-                history.mark_saved(document)
+                history.mark_saved(step)
                 tab.path = path
                 editor.settings = editor.settings.with_recent(path)
                 editor.say(t("Saved {name} in {folder}", name=path.name,
@@ -474,6 +474,6 @@ class Tasks:
             editor.complain_of(error)
 
         editor.jobs.start(
-            t("Saving {name}", name=path.name), job_functions.write_session, document, path,
+            t("Saving {name}", name=path.name), job_functions.write_session, step.document, path,
             done=accept, failed=fail, kind=f"{WRITE} {path}",
         )  # fmt: skip
