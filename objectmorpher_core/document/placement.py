@@ -319,6 +319,10 @@ class Ground:
     normal: F64  # (3,) world, unit, down
     height: float  # world units, of the camera above it; above 0
 
+    def is_as(self, other: Ground) -> bool:
+        """Whether both are the same plane."""
+        return self.height == other.height and np.array_equal(self.normal, other.normal)
+
     def below(self, points: np.ndarray) -> F64:
         """(...) world units by which points (..., 3) are below the ground; negative above it."""
         return points @ self.normal - self.height

@@ -8,14 +8,14 @@ far away as it was in its own photo, which gives it the size that it would have 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
 from ..base.arrays import F64, frozen
 from ..base.camera import Camera
 from .edits import free_name
-from .model import Document, EditObject, LiftedObject, Origin, Placement, Prompt
+from .model import Document, EditObject, LiftedObject, Matte, Origin, Placement, Prompt
 from .placement import Ground, GroundError, centre_of, down_of, ground_under, with_centre
 from .settings import USUAL_SHARES
 
@@ -94,14 +94,25 @@ def ground_for(document: Document, item: EditObject) -> Ground | None:
 def changes_visitor(before: Document, after: Document) -> EditObject | None:
     """The visitor of `before` whose outline or shape is another one in `after`, if there is one.
 
-    Both are of a photo that is not there to look at.
+    Both are of a photo that is not there to look at. Paint is of neither.
     """
     if len(before.objects) != len(after.objects):
         return None
     for one, other in zip(before.objects, after.objects, strict=True):
-        if one.is_visitor and any(getattr(one, n) is not getattr(other, n) for n in KEPT):
+        if one.is_visitor and (
+            any(getattr(one, n) is not getattr(other, n) for n in KEPT if n != "matte")
+            or not _differs_in_paint_alone(one.matte, other.matte)
+        ):
             return one
     return None
+
+
+def _differs_in_paint_alone(one: Matte | None, other: Matte | None) -> bool:
+    """Whether two mattes are the same but for what is painted on them."""
+    if one is None or other is None:
+        return one is other
+    names = (f.name for f in fields(one) if f.name != "paint")
+    return all(getattr(one, name) is getattr(other, name) for name in names)
 
 
 def _fitted(

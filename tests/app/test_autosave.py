@@ -82,7 +82,7 @@ def test_what_is_unsaved_is_kept_until_it_is_saved(editor: Editor, root: Path) -
     assert_is_step(read_journal(folder), 3)
     assert read_about(folder)["name"] == editor.committed.photo.name
     editor.tab.path = root / "of the walk.omorph"
-    editor.history.mark_saved(editor.committed)
+    editor.history.mark_saved()
     settle(editor)
     assert folders(root) == []
     editor.apply("Step", step_document(editor.committed, 4))

@@ -91,6 +91,7 @@ def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Ed
         ("transparency", "Opacity"), ("100%", "Actual size"), ("dark mode", "Theme"),
         ("heal", "Background alone"), ("drop shadow", "Shadow"), ("deselect", "Clear selection"),
         ("hotkeys", "Keyboard and pointer…"), ("hue", "Saturation"), ("flip", "Symmetry"),
+        ("hide", "Hide object"), ("take away", "Hide object"), ("animation", "Add key pose"),
     ):  # fmt: skip
         palette._typed = typed
         assert title in [entry.title for entry in palette._found(editor)][:3], typed

@@ -70,6 +70,20 @@ def test_a_stroke_is_one_step_and_undone_as_one(bare: Editor, ball: Document) ->
     assert bare.document is ball
 
 
+def test_undo_takes_back_the_stroke_that_is_not_filled_in_yet(bare: Editor, ball: Document) -> None:
+    paint(bare, (20, 20), (60, 24))
+    paint(bare, (20, 40), (60, 44))
+    bare.undo()
+    assert bare.composing.is_repairing, "the first one goes on"
+    bare.undo()
+    assert not bare.composing.is_repairing and bare.composing.painted_layer() is None
+    wait_for_jobs(bare)
+    assert bare.document is ball
+    paint(bare, (20, 20), (60, 24))
+    wait_for_repairs(bare)
+    assert bare.history is not None and bare.history.undo_label == "Repair background"
+
+
 @pytest.mark.slow
 def test_strokes_in_a_row_are_all_filled_in(bare: Editor, ball: Document) -> None:
     for y in (15, 40, 120):

@@ -91,7 +91,7 @@ def test_unsaved_means_not_the_saved_document() -> None:
     assert past.is_saved
     past.apply("One", second)
     assert not past.is_saved
-    past.mark_saved(second)
+    past.mark_saved()
     assert past.is_saved
     past.undo()
     assert not past.is_saved
@@ -104,6 +104,24 @@ def test_a_computed_addition_is_no_step_and_keeps_saved() -> None:
     assert past.document is added
     assert past.is_saved
     assert past.undo_label is None
+
+
+def test_what_is_computed_while_a_file_is_written_keeps_saved_what_comes_back_by_itself() -> None:
+    past = History(document())
+    for is_repeatable in (True, False):
+        past.apply("One", document())
+        written = past.step
+        past.amend(document(), is_repeatable=is_repeatable)
+        past.mark_saved(written)
+        assert past.is_saved == is_repeatable
+        past.apply("Two", document())
+        past.mark_saved(written)
+        assert not past.is_saved
+        past.undo()
+        assert past.is_saved == is_repeatable
+    past.mark_saved()
+    past.amend(document(), is_repeatable=False)
+    assert not past.is_saved, "opened again, the file would not show it"
 
 
 def test_the_list_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

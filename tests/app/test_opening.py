@@ -27,6 +27,7 @@ from objectmorpher.editor.view import ToolName
 from objectmorpher.system.freed_memory import set_aside
 from objectmorpher.system.texts import sentence
 from objectmorpher.worker.jobs import Jobs
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document
 from objectmorpher_core.pictures.image import Picture, at_most, encode_picture, read_picture
 from objectmorpher_core.session.file import save_session
@@ -209,6 +210,17 @@ def test_a_sample_opens_with_its_thing_lifted_and_nothing_to_save(
     assert not editor.is_lifted, "and it does not begin anew"
 
 
+def test_what_is_filled_in_while_a_session_is_written_leaves_nothing_to_save(
+    editor: Editor, ball: Document, tmp_path: Path
+) -> None:
+    editor.start(edits.set_plate(ball, None))
+    editor.poll()
+    editor.filing.save_as(tmp_path / "ball.omorph")
+    wait_for_jobs(editor)
+    assert editor.document is not None and editor.document.plate is not None
+    assert editor.is_saved, "the artist has changed nothing since"
+
+
 def test_what_was_computed_for_a_closed_document_is_let_go(editor: Editor, ball: Document) -> None:
     """A session opened in its place, or none: neither keeps gigabytes alive."""
     other = replace(ball, photo=replace(ball.photo, name="other.png"))
@@ -233,7 +245,7 @@ def test_a_missing_file_is_not_worth_a_question_and_keeps_its_name(
     assert editor.filing.question is None
     assert editor.message is not None and editor.message.text.startswith("cat 2.png cannot")
     assert sentence("the photo ball.png is empty").startswith("The photo")
-    editor.history.mark_saved(ball)
+    editor.history.mark_saved()
 
 
 def test_what_was_left_is_offered_where_no_start_screen_shows_it(

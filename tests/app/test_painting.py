@@ -144,3 +144,22 @@ def test_a_stroke_is_dropped_by_escape(painting: Editor):
     editor.escape()
     assert editor.painting.painted_layer() is None and editor.document is document
     assert editor.view.tool is ToolName.COMPOSE
+
+
+def test_undo_takes_back_the_stroke_that_is_not_on_the_object_yet(painting: Editor):
+    editor, document = painting, painting.document
+    assert editor.history is not None
+    editor.apply("Turn", edits.set_placement(editor.opened, 0, Placement(turn=(40.0, 0.0, 0.0))))
+    at = editor.view.canvas_from_image(np.array(AT))
+    stroke(editor, ComposeTool(), at, at)
+    assert editor.painting.is_busy
+    run(editor, "undo")
+    assert not editor.painting.is_busy and editor.painting.painted_layer() is None
+    assert editor.history.undo_label == "Turn", "nothing before it"
+    wait_until(editor, lambda: editor.chores.is_idle)
+    assert editor.object is not None and not editor.object.is_painted
+    paint(editor, AT)
+    assert editor.object.is_painted, "the next one sticks"
+    run(editor, "undo")
+    run(editor, "undo")
+    assert editor.document is document

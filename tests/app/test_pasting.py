@@ -13,6 +13,8 @@ from editor_steps import close_all, wait_for_jobs, wait_until
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.brush_tools import ComposeTool
+from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.harmonize import MOST, visitor_gain
@@ -25,6 +27,7 @@ from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.session.file import decode_session, encode_session
 from objectmorpher_core.session.journal import Journal, read_journal
+from strokes import stroke
 from test_editor import canvas_xy, drag
 
 SHARED = ("gaussians", "control_points", "world_from_object", "sides", "texture")
@@ -165,6 +168,31 @@ def test_its_outline_is_not_changed_here(pasted: Editor) -> None:
     moved = edits.set_placement(document, 0, Placement(move=(9.0, 0.0)))
     pasted.apply("Move", moved)
     assert pasted.committed is moved
+
+
+def test_what_comes_from_another_photo_can_be_painted_on(pasted: Editor) -> None:
+    """The sides that it shows here are invented here: they are mended here."""
+    document = pasted.committed
+    assert document is not None
+    frame = pasted.placing.frame()
+    assert frame is not None
+    spot = np.asarray(frame.corners).mean(0)
+    pasted.view.brush = Brush(6.0, 1.0)
+    pasted.view.compose.ink = (0.1, 0.9, 0.2)
+    run(pasted, "paint")
+    at = pasted.view.canvas_from_image(spot)
+    stroke(pasted, ComposeTool(), at, at)
+    wait_until(pasted, lambda: not pasted.painting.is_busy)
+    painted = pasted.committed
+    assert painted is not None and painted.objects[0].is_painted, pasted.message
+    x, y = spot.astype(int)
+    shown = composite(painted).pixels[y, x].astype(int)
+    assert np.abs(shown - 255 * np.array((0.1, 0.9, 0.2))).max() < 60
+    assert composite(document).pixels[y, x].astype(int)[1] < shown[1]
+    again = decode_session(encode_session(painted))
+    np.testing.assert_array_equal(composite(again).pixels, composite(painted).pixels)
+    pasted.view.compose = type(pasted.view.compose)()
+    pasted.view.brush = Brush()
 
 
 def test_beside_an_object_of_the_photo_each_is_edited_by_itself(

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
+from imgui_bundle import imgui
 
 from objectmorpher.commands import COMMANDS, GROUPS, keys_of
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
 from objectmorpher.editor.shortcuts import FIXED, Shortcuts
+from objectmorpher.gui.window.input import part_frames
 
 
 @pytest.fixture
@@ -67,3 +69,36 @@ def test_keys_with_a_fixed_meaning_are_refused(shortcuts: Shortcuts, keys: str) 
 
 def test_keys_are_not_taken_unless_awaited(shortcuts: Shortcuts) -> None:
     assert not shortcuts.take("Ctrl+S")
+
+
+def test_a_field_sees_a_chord_whole_that_one_slow_frame_brings() -> None:
+    """Ctrl is let go before A is, and ImGui would take A and that in the same frame."""
+    imgui.create_context()
+    try:
+        io, key, text = imgui.get_io(), imgui.Key, "abc"
+        io.set_ini_filename("")
+        io.display_size = imgui.ImVec2(400, 300)
+        io.backend_flags |= imgui.BackendFlags_.renderer_has_textures.value
+
+        def draw(typed: str, is_new: bool = False) -> str:
+            for n in range(4):
+                imgui.new_frame()
+                if is_new and n == 0:
+                    imgui.set_keyboard_focus_here()
+                typed = imgui.input_text("##field", typed)[1]
+                imgui.end_frame()
+            return typed
+
+        text = draw(text, is_new=True)
+        for event in ((key.end, True), (key.end, False), (key.mod_ctrl, True)):
+            io.add_key_event(*event)
+            text = draw(text)
+        io.add_key_event(key.a, True)
+        part_frames()
+        io.add_key_event(key.mod_ctrl, False)
+        io.add_key_event(key.a, False)
+        text = draw(text)
+        io.add_input_character(ord("x"))
+        assert draw(text) == "x", "all was selected, and is replaced"
+    finally:
+        imgui.destroy_context()

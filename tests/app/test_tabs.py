@@ -210,6 +210,27 @@ def test_a_save_that_ends_in_another_tab_is_of_the_one_it_began_in(
     assert first.path == tmp_path / "a.omorph" and second.path is None
 
 
+def test_quitting_waits_for_what_is_being_saved_and_asks_only_if_it_is_not(
+    tabs: Editor, tmp_path: Path
+) -> None:
+    first, filing = tabs.tabs.all[0], tabs.filing
+    go(tabs, first)
+    move(tabs, 3.0)
+    for name, stops in (("a", True), ("b", False)):
+        path = tmp_path / f"{name}.omorph"
+        filing.save_as(path)
+        run(tabs, "quit")
+        assert filing.question is None and filing.writing == (path.name,) and not tabs.is_over
+        if stops:
+            filing.answer_stop()
+            wait_until(tabs, lambda: filing.question is not None)
+            assert filing.asked == (first,) and not tabs.is_over, "nothing holds it now"
+            filing.answer_cancel()
+    wait_until(tabs, lambda: tabs.is_over)
+    assert decode_session(path.read_bytes()).objects[0].placement.move == (3.0, 0.0)
+    tabs.is_over = False
+
+
 def test_unsaved_work_of_every_tab_is_kept_safe(
     tabs: Editor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -43,6 +43,7 @@ SETTINGS: dict[str, tuple[str, ...]] = {
 
 OTHER_WORDS = {
     "Actual size": "100% 1:1",
+    "Add key pose": "animation keyframe timeline video",
     "Background alone": "heal repair retouch clean plate spot",
     "Blend": "feather edge anti-alias",
     "Blend mode": "multiply screen overlay",
@@ -61,6 +62,7 @@ OTHER_WORDS = {
     "Focus": "depth of field bokeh defocus",
     "Grain": "noise",
     "Grow": "expand dilate",
+    "Hide object": "take away remove delete erase show visible eye",
     "Invert selection": "inverse",
     "Keyboard and pointer…": "hotkeys shortcuts keymap keys",
     "Language": "translation locale",

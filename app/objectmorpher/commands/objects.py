@@ -57,6 +57,13 @@ COMMANDS: dict[str, Command] = {
     ),
     "rename": Command("Rename object", "", _rename, no_selection),
     "duplicate": Command("Duplicate object", "Ctrl+J", lambda e: e.objects.duplicate(), no_lift),
+    "hide": Command(
+        "Hide object",
+        "",
+        lambda e: e.objects.toggle_visible(e.current),
+        no_lift,
+        lambda e: e.object is not None and not e.object.is_visible,
+    ),
     "remove_object": Command(
         "Remove object", "Shift+Delete", lambda e: e.objects.remove(), no_selection
     ),

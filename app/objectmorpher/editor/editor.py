@@ -196,6 +196,9 @@ class Editor(EditorState):
         if self.tasks.question is not None:
             self.jobs.cancel(SELECT)
             return
+        if label := self.painting.take_back() or self.composing.take_back():
+            self.say(t("Undone: {label}", label=label))
+            return
         label = self.history.undo_label
         text = t("Undone: {label}", label=label) if label else t("Nothing to undo")
         self._travel(self.history.undo, text)

@@ -172,16 +172,20 @@ class Filing:
     def quit(self, end: Callable[[], None], but: Tab | None = None) -> None:
         """`end`, after one question about all tabs, save `but`, with unsaved changes.
 
-        It waits for files that are being written, which the user may stop.
+        It waits for files that are being written, which the user may stop. What one of them will
+        hold is asked about only if it does not.
         """
+        tabs = tuple(tab for tab in self._tabs.all if tab is not but)
+        hopeful = tuple(tab for tab in tabs if tab.is_being_saved)
 
         def leave() -> None:
             if self.writing:
-                self._editor.message, self.leaving = None, end
+                self._editor.message = None
+                self.leaving = lambda: self.guard(end, hopeful)
             else:
-                end()
+                self.guard(end, hopeful)
 
-        self.guard(leave, tuple(tab for tab in self._tabs.all if tab is not but))
+        self.guard(leave, tuple(tab for tab in tabs if tab not in hopeful))
 
     @property
     def writing(self) -> tuple[str, ...]:
@@ -405,6 +409,6 @@ class SampleOpening:
             return True
         elif editor.is_lifted:
             assert editor.history is not None
-            editor.history.mark_saved(document)  # the artist has done nothing yet
+            editor.history.mark_saved()  # the artist has done nothing yet
             self._photo = None
         return False

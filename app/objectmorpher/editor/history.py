@@ -21,9 +21,9 @@ DEPTH = 10_001  # steps: a day's ten thousand edits, and the one that undoing th
 LIMIT = 1 << 30  # bytes that old steps may hold beside what the shown document holds
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Step:
-    """A document, and what was done to get it."""
+    """A document, and what was done to get it; `History.amend` adds to the document."""
 
     label: str  # "Move handle"
     document: Document
@@ -44,7 +44,12 @@ class History:
 
     @property
     def document(self) -> Document:
-        return self._steps[self._cursor].document
+        return self.step.document
+
+    @property
+    def step(self) -> Step:
+        """The step that is shown."""
+        return self._steps[self._cursor]
 
     @property
     def steps(self) -> tuple[str, ...]:
@@ -61,9 +66,12 @@ class History:
         """Whether what is shown is what the file holds."""
         return self.document is self._saved
 
-    def mark_saved(self, document: Document) -> None:
-        """`document`, which may be an older one by now, is what the file holds."""
-        self._saved = document
+    def mark_saved(self, step: Step | None = None) -> None:
+        """The file holds `step`, as it was when it was shown; None: the one that is shown.
+
+        It may have been amended while the file was written: that comes back when it is opened.
+        """
+        self._saved = (step or self.step).document
 
     def mark_unsaved(self) -> None:
         """No file holds any of this."""
@@ -80,20 +88,26 @@ class History:
         self._cursor = len(self._steps) - 1
         self._forget_oldest()
 
-    def amend(self, document: Document) -> None:
-        """`document` replaces the current one without a step: computed additions to it."""
-        step = self._steps[self._cursor]
-        if step.document is self._saved:
-            self._saved = document
+    def amend(self, document: Document, is_repeatable: bool = True) -> None:
+        """`document` replaces the current one without a step: computed additions to it.
+
+        `is_repeatable`: a file without them gets them when it is opened, so that what is saved
+        stays saved. Else what is shown is not what the file holds.
+        """
+        step = self.step
         self._memory.let_go(step.document)
-        self._steps[self._cursor] = Step(step.label, document)
+        if is_repeatable:
+            self._saved = document if step.document is self._saved else self._saved
+            step.document = document
+        else:
+            self._steps[self._cursor] = Step(step.label, document)
         self._memory.take(document)
         self._forget_oldest()
 
     @property
     def undo_label(self) -> str | None:
         """Return the label of the step that `undo` would take back, or None."""
-        return self._steps[self._cursor].label if self._cursor > 0 else None
+        return self.step.label if self._cursor > 0 else None
 
     @property
     def redo_label(self) -> str | None:

@@ -26,7 +26,7 @@ from ..worker.job_functions import WARM
 from ..worker.jobs import Jobs
 from ..worker.requests import LIFT, READY, Chores, JobError
 from .autosave import Autosave
-from .history import History
+from .history import History, Step
 from .settings import Settings
 from .view import Action, Hover, StatusMessage, ViewState
 
@@ -52,6 +52,7 @@ class Tab:
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
     exported: str = ""  # what of it was exported last, see `export_plan.py`
+    writing: Step | None = None  # which a session's file is to hold, that is not written yet
     autosave: Autosave = field(init=False)
 
     def __post_init__(self) -> None:
@@ -65,6 +66,11 @@ class Tab:
     @property
     def is_saved(self) -> bool:
         return self.history is None or self.history.is_saved
+
+    @property
+    def is_being_saved(self) -> bool:
+        """Whether what is shown is on its way to the disk."""
+        return self.history is not None and self.history.step is self.writing
 
     @property
     def name(self) -> str:

@@ -456,11 +456,15 @@ class Tasks:
         editor, tab, history = self._editor, self._editor.tab, self._editor.history
         if history is None:
             return
-        document = history.document
+        step = history.step
+
+        def end() -> None:
+            tab.writing = None if tab.writing is step else tab.writing
 
         def accept(_: None) -> None:
+            end()
             if tab.history is history:  # which may not be the tab that is shown by now
-                history.mark_saved(document)
+                history.mark_saved(step)
                 tab.path = path
                 editor.settings = editor.settings.with_recent(path)
                 editor.say(t("Saved {name} in {folder}", name=path.name,
@@ -469,11 +473,13 @@ class Tasks:
                     then()
 
         def fail(error: JobError) -> None:
+            end()
             if editor.tab is tab:
                 error = error.retried_by(lambda: self.save(path, then))  # as it is by then
             editor.complain_of(error)
 
         editor.jobs.start(
-            t("Saving {name}", name=path.name), job_functions.write_session, document, path,
-            done=accept, failed=fail, kind=f"{WRITE} {path}",
+            t("Saving {name}", name=path.name), job_functions.write_session, step.document, path,
+            done=accept, failed=fail, cancelled=end, kind=f"{WRITE} {path}",
         )  # fmt: skip
+        tab.writing = step

@@ -394,7 +394,7 @@ def test_key_poses_are_steps_and_become_a_film(moved: Editor) -> None:
 
     exporting.open()
     exporting.choose_what(What.VIDEO)
-    exporting.choose_motion(VideoMotion.KEYS)
+    assert exporting.draft is not None and exporting.draft.motion is VideoMotion.KEYS
     exporting.choose_seconds(1.0)
     exporting.choose_format(Format.PNG)
     assert exporting.problem is None and exporting.is_folder

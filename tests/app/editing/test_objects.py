@@ -12,7 +12,7 @@ from PIL import Image
 
 from editor_steps import CENTRE, HEIGHT, WIDTH, duplicate, wait_for_jobs, wait_until
 from objectmorpher.canvas.frame import build_frame, drawn_order
-from objectmorpher.commands import run, why_not
+from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
@@ -113,6 +113,17 @@ def test_removing_the_copy_leaves_the_object_and_its_background(copied: Editor) 
     assert copied.current == 0
     run(copied, "undo")
     assert len(copied.document.objects) == 2
+
+
+def test_hiding_takes_it_out_of_the_picture_by_a_command_too(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    run(editor, "hide")
+    assert editor.object is not None and not editor.object.is_visible
+    assert COMMANDS["hide"].is_on is not None and COMMANDS["hide"].is_on(editor)
+    run(editor, "hide")
+    assert editor.object is not None and editor.object.is_visible
 
 
 def test_removing_the_last_object_gives_the_photo_back(editor: Editor, ball: Document) -> None:

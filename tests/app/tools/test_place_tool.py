@@ -325,6 +325,26 @@ def test_the_horizon_can_be_dragged_and_is_one_step(grounded: Editor) -> None:
     assert grounded.document.horizon == 40.0
 
 
+@pytest.mark.parametrize("is_horizon", [True, False])
+def test_what_has_moved_stays_on_the_ground_that_is_told_later(
+    grounded: Editor, is_horizon: bool
+) -> None:
+    """The next turn would otherwise move it there at a jump."""
+    start, placing = spot_on(grounded), grounded.placing
+    stroke(grounded, start, start + (40, -50))
+    assert grounded.document is not None and grounded.object is not None
+    before, seen = placing.placement, grounded.derived.posed(grounded.document, 0).means.mean(0)
+    placing.drag_horizon(10.0) if is_horizon else placing.look_down(40.0)
+    grounded.commit("The ground")
+    assert placing.placement != before
+    assert abs(below_ground(grounded)) < EXACT
+    after = grounded.derived.posed(grounded.document, 0).means.mean(0)
+    camera = grounded.document.photo.camera
+    np.testing.assert_allclose(camera.project(after), camera.project(seen), atol=8.0)
+    grounded.undo()
+    assert placing.placement == before
+
+
 def test_above_the_horizon_it_says_why_and_does_not_snap(grounded: Editor) -> None:
     grounded.placing.drag_horizon(135.0)
     grounded.commit("Move the horizon")

@@ -254,24 +254,40 @@ class Composing:
         patch = patch_of(document, stroke.coverage, stroke.box)
 
         def accept(answer: tuple[PlatePatch, str]) -> None:
-            self._answers.add(lambda: self._take_repair(asked, *answer))
+            self._answers.add(lambda: self._take_repair(stroke, asked, *answer))
 
         def fail(error: JobError) -> None:
             self._waiting = []
             editor.complain_of(error.retried_by(lambda: self._enqueue(stroke)))
 
         def drop() -> None:
-            self._waiting = []
+            if self._is_first(stroke):
+                self._waiting = []
 
         editor.jobs.start(
             t("Repairing the background"), job_functions.repair, patch, margin_of(document),
             self.choice(asked.seed + 1), done=accept, failed=fail, cancelled=drop, kind=REPAIR,
         )  # fmt: skip
 
-    def _take_repair(self, asked: Plate, patch: PlatePatch, backend: str) -> None:
-        """A repaired part; it is dropped where the background is another one by now."""
+    def _is_first(self, stroke: Stroke) -> bool:
+        return bool(self._waiting) and self._waiting[0] is stroke
+
+    def take_back(self) -> str:
+        """Forget the last stroke that is not filled in yet; its label, "" for none."""
+        if not self._waiting:
+            return ""
+        self._waiting.pop()
+        if not self._waiting:
+            self._editor.jobs.cancel(REPAIR)
+        return t("Repair background")
+
+    def _take_repair(self, stroke: Stroke, asked: Plate, patch: PlatePatch, backend: str) -> None:
+        """A repaired part; dropped where the background is another one by now, or the stroke was
+        taken back."""
         from objectmorpher_core.compose.plate.repair import with_patch
 
+        if not self._is_first(stroke):
+            return
         editor, document = self._editor, self._editor.committed
         self._waiting = self._waiting[1:]
         if document is not None and document.plate is asked:

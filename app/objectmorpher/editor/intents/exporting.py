@@ -75,16 +75,21 @@ class Exporting:
         last = Path(settings.export_folder)
         is_kept = file is None and settings.export_folder and last.is_dir()
         folder = file.absolute().parent if file else (last if is_kept else pictures_folder())
-        motion = next(
-            (m for m in VideoMotion if m.value == settings.export_motion), VideoMotion.MORPH
-        )
-        motion = motion if self.why_no_motion(motion) is None else VideoMotion.SWAY
+        motion = self._motion(settings.export_motion)
         seconds = min(max(settings.export_seconds, LENGTHS[0]), LENGTHS[1])
         draft = Draft(
             what, format, settings.export_bits, settings.quality, settings.webp_quality, motion,
             seconds, folder, "",
         )  # fmt: skip
         self.draft = self._named(self._fitting(draft))
+
+    def _motion(self, last: str) -> VideoMotion:
+        """The way through the key poses, in the first video of a tab that has some; else `last`."""
+        motion = next((m for m in VideoMotion if m.value == last), VideoMotion.MORPH)
+        is_first = self._editor.tab.exported != What.VIDEO.value
+        if is_first and self.why_no_motion(VideoMotion.KEYS) is None:
+            return VideoMotion.KEYS
+        return motion if self.why_no_motion(motion) is None else VideoMotion.SWAY
 
     def close(self) -> None:
         self.draft = self._replacing = None

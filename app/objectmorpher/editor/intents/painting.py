@@ -192,6 +192,16 @@ class Painting:
         if len(self._waiting) == 1:
             self._lay()
 
+    def take_back(self) -> str:
+        """Forget the last stroke that is not on the object yet; its label, "" for none."""
+        if not self._waiting:
+            return ""
+        laid = self._waiting.pop()[1]
+        if not self._waiting:
+            self._editor.chores.cancel(PAINT)
+            self._answers.forget()
+        return _label(laid)
+
     def remove(self) -> None:
         """The current object without any paint; one step."""
         editor, document = self._editor, self._editor.committed
@@ -265,8 +275,7 @@ class Painting:
                 editor.say(t("There is nothing of {name} to paint on", name=asked.name))
             else:
                 editor.derived.remember(answer.item, answer.shape)
-                label = t("Erase paint") if laid.is_erasing else t("Paint on the object")
-                editor.apply(label, document.with_object(k, answer.item))
+                editor.apply(_label(laid), document.with_object(k, answer.item))
                 if answer.is_mirrored:
                     editor.say(t("This back is the front mirrored: both are painted"))
         if self._waiting:
@@ -284,3 +293,8 @@ class Painting:
             r, g, b = (round(255 * v) for v in last.ink)
             ink = r, g, b
         return stroke_tint(self._editor.view, [one.stroke for one in laid], ink)
+
+
+def _label(laid: _Laid) -> str:
+    """Of the step that lays it."""
+    return t("Erase paint") if laid.is_erasing else t("Paint on the object")

@@ -10,7 +10,7 @@ import numpy as np
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import CAMERA_GIMBAL, Gimbal
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import LiftedObject, Placement
+from objectmorpher_core.document.model import Document, LiftedObject, Placement
 from objectmorpher_core.document.placement import (
     Ground,
     HeldPoint,
@@ -83,7 +83,8 @@ class Placing:
         """Previews the current object as seen from so many degrees above; None: as it stands."""
         editor = self._editor
         if editor.committed is not None and editor.is_lifted:
-            editor.preview = set_seen_from(editor.committed, editor.current, degrees)
+            changed = set_seen_from(editor.committed, editor.current, degrees)
+            editor.preview = self._on_new_ground(changed)
 
     @property
     def angles(self) -> tuple[float, float, float]:
@@ -226,14 +227,21 @@ class Placing:
         points = thing.lifted.world_points(own)
         return points, thing.lifted, document.photo.camera, self.gimbal.down
 
-    def _offsets(self, placement: Placement) -> np.ndarray:
-        """(N, 3) world: where the object's Gaussians are from its centre, turned and scaled."""
-        document, thing = self._editor.opened, self._editor.chosen
-        assert thing.lifted is not None
+    def _offsets(
+        self, placement: Placement, document: Document | None = None, k: int | None = None
+    ) -> np.ndarray:
+        """(N, 3) world: where an object's Gaussians are from its centre, turned and scaled.
+
+        Of object `k` in `document`, by default of the current one as it is shown.
+        """
+        document = self._editor.opened if document is None else document
+        k = self._editor.current if k is None else k
+        lifted = document.objects[k].lifted
+        assert lifted is not None
         rest = replace(placement, move=(0.0, 0.0), depth=0.0)
-        linear = rest.matrix(thing.lifted, document.photo.camera)[:3, :3]
-        points = self._editor.derived.body_points(document, self._editor.current)
-        return (thing.lifted.world_points(points) - thing.lifted.centre) @ linear.T
+        linear = rest.matrix(lifted, document.photo.camera)[:3, :3]
+        points = self._editor.derived.body_points(document, k)
+        return (lifted.world_points(points) - lifted.centre) @ linear.T
 
     def toggle_ground(self) -> None:
         """The object slides over the ground while it is moved, or not any more; one step."""
@@ -254,7 +262,28 @@ class Placing:
         """Previews the horizon in another row of the photo, px."""
         editor = self._editor
         if editor.committed is not None:
-            editor.preview = edits.set_horizon(editor.committed, row)
+            editor.preview = self._on_new_ground(edits.set_horizon(editor.committed, row))
+
+    def _on_new_ground(self, changed: Document) -> Document:
+        """`changed`, in which the ground lies differently: what slides over it is still on it,
+        and seen where it was."""
+        before, camera = self._editor.committed, changed.photo.camera
+        assert before is not None
+        for k, item in enumerate(changed.objects):
+            if item.lifted is None or not item.is_grounded or item.is_locked:
+                continue
+            ground, was = ground_for(changed, item), ground_for(before, before.objects[k])
+            is_same = was is not None and ground is not None and was.is_as(ground)
+            if ground is None or is_same or item.placement.is_identity:
+                continue
+            try:
+                centre = centre_of(item.placement, item.lifted, camera)
+                contact = ground.lowest(centre + self._offsets(item.placement, changed, k))
+                held = HeldPoint(item.placement, item.lifted, camera, contact, ground)
+                changed = edits.set_placement(changed, k, held.moved(np.zeros(2)))
+            except ValueError:  # behind the camera: it stays where it is
+                continue
+        return changed
 
     # Steps
 

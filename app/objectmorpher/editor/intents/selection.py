@@ -179,7 +179,7 @@ class Selection:
             return
         if loses_work(editor.history.document, document, question.k):
             return
-        editor.history.amend(document)
+        editor.history.amend(document, is_repeatable=False)
         if question.combine in (Combine.ANEW, Combine.REFINED):
             self._told = editor.mask, found.confidence
 

@@ -127,6 +127,18 @@ def is_for_controls(keys: str) -> bool:
     )  # fmt: skip
 
 
+def part_frames() -> None:
+    """What comes next is for ImGui's next frame.
+
+    Called before a modifier is let go: of a key pressed with it and its release, which a slow frame
+    may bring together, a field would see the key alone. ImGui takes two events of one key, which
+    no keyboard here has, in two frames.
+    """
+    io = imgui.get_io()
+    io.add_key_event(imgui.Key.f24, True)
+    io.add_key_event(imgui.Key.f24, False)
+
+
 # A pointer on the canvas for those who have no mouse: arrows move it, keys press at it.
 
 STRIDE, FAR = 8.0, 64.0  # points that an arrow moves it, and with Shift

@@ -79,8 +79,8 @@ MENUS: dict[str, tuple[str, ...]] = {
     ),
     "Object": (
         "lift", "add_photo", "import_shape", "fit_again", "-", "rename", "duplicate", "lock",
-        "remove_object", "-", "keep_in_front", "forward", "backward", "to_front", "to_back", "-",
-        "ground", "-",
+        "hide", "remove_object", "-",
+        "keep_in_front", "forward", "backward", "to_front", "to_back", "-", "ground", "-",
         "paint", "unpaint", "-", "bare", "take_from", "forget_sources", "fill_again", "shadow",
         "take_shadow", "depth",
     ),

@@ -38,7 +38,7 @@ from ..widgets.panes import Layout, Rect, fades, has_panel, lay_out
 from ..widgets.theme import theme
 from ..widgets.widgets import pictures
 from . import landmarks
-from .input import HELP, Input
+from .input import HELP, Input, part_frames
 from .landmarks import FrameLog
 from .menu import draw_menu, draw_toolbar
 from .overlays import draw_overlays
@@ -341,6 +341,8 @@ class Window:
 
     def _take_key(self, _window: object, key: int, scancode: int, action: int, mods: int) -> None:
         """Names the chord while the modifiers are what they were when the key went down."""
+        if action == glfw.RELEASE and glfw.KEY_LEFT_SHIFT <= key <= glfw.KEY_RIGHT_SUPER:
+            part_frames()
         if action not in (glfw.PRESS, glfw.REPEAT):
             return
         if action == glfw.REPEAT and key in ONCE:
