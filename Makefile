@@ -16,7 +16,9 @@ PIP := $(PYTHON) -m pip --disable-pip-version-check
 # worker process, which would compile all sources anew.
 COMPILE := $(PYTHON) -m compileall -q -j 0 app objectmorpher_core research tests
 # The kernels, before processes that begin together compile the same ones.
-KERNELS := $(PYTHON) -m tests.kernels
+KERNELS := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m tests.kernels
+# Of what tests need, Python compiles what they import when they do: a third of it.
+INSTALL := $(PIP) install --no-compile
 PHOTO ?=
 ARGS ?=
 LOCK ?= # versions and hashes of what the tests need: packaging/locks/ci.txt
@@ -75,7 +77,7 @@ test-rest: .make/test
 	$(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE 'mark\.slow|quick\(|browser|$(LEARNED)' tests --include='test_*.py' | sort)
 
 .make/models: .make/test
-	@$(PIP) install -q '$(TORCH)' $(BESIDE) -e '.[dev,models,research,cluster]' -e research
+	@$(INSTALL) -q '$(TORCH)' $(BESIDE) -e '.[dev,models,research,cluster]' -e research
 	touch $@
 
 # The study's page in a real browser, which `make test` leaves out: Chromium is large.
@@ -84,7 +86,7 @@ test-browser: .make/browser
 	@$(PYTHON) -m pytest -m "slow or not slow" $(ARGS) tests/research/study/test_study_browser.py
 
 .make/browser: .make/test
-	@$(PIP) install -q -e '.[dev,browser]' -e research
+	@$(INSTALL) -q -e '.[dev,browser]' -e research
 	$(APT)
 	command -v chromedriver >/dev/null || apt_install chromium chromium-driver
 	touch $@
@@ -103,8 +105,8 @@ test-browser: .make/browser
 
 .make/test: .make/venv pyproject.toml research/pyproject.toml
 	@echo "Installing ObjectMorpher and its test tools into .venv (minutes, the first time)"
-	if [ -n "$(LOCK)" ]; then $(PIP) install --progress-bar on --require-hashes -r "$(LOCK)"; fi
-	$(PIP) install --progress-bar on -e '.[dev]' -e research
+	if [ -n "$(LOCK)" ]; then $(INSTALL) --progress-bar on --require-hashes -r "$(LOCK)"; fi
+	$(INSTALL) --progress-bar on -e '.[dev]' -e research
 	$(APT)
 	missing=()
 	$(PYTHON) -c 'import ctypes; ctypes.CDLL("libGL.so.1")' 2>/dev/null || missing+=(libgl1)

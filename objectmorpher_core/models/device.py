@@ -26,11 +26,14 @@ def has_torch() -> bool:
 
 
 def devices() -> tuple[Device, ...]:
-    """Return this machine's devices, the quickest first and the CPU last. Imports torch.
+    """Return this machine's devices, the quickest first and the CPU last.
 
-    ROCm's GPUs are "cuda", too: that is how PyTorch names them. Raises ModelError where the
-    environment asks for a device that is not there.
+    Imports torch, unless the environment asks for the CPU. ROCm's GPUs are "cuda", too: that is how
+    PyTorch names them. Raises ModelError where the environment asks for a device that is not there.
     """
+    wanted = os.environ.get(DEVICE, "")
+    if wanted == "cpu":
+        return ("cpu",)
     import torch
 
     found: list[Device] = []
@@ -39,7 +42,6 @@ def devices() -> tuple[Device, ...]:
     if torch.backends.mps.is_available():
         found.append("mps")
     found.append("cpu")
-    wanted = os.environ.get(DEVICE, "")
     if wanted and wanted not in found:
         raise ModelError(f"{DEVICE} is {wanted!r}; this machine has {', '.join(found)}")
     return tuple(d for d in found if d == wanted) if wanted else tuple(found)

@@ -20,6 +20,7 @@ from objectmorpher.editor.settings import Settings
 from objectmorpher.editor.view import ViewState
 from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.models import device
 from tests import kernels, remembered
 
 if TYPE_CHECKING:
@@ -146,7 +147,8 @@ def compiled() -> None:
 def window_environment(compiled: None, display: str, tmp_path: Path) -> dict[str, str]:
     """For a process with a window: its display, and settings of its own."""
     settings = 'dialogs = "built-in"\ngaussians = 3000\n'
-    return hands.window_environment(display, tmp_path, settings)
+    # On the CPU: else each window imports PyTorch, if there is one, to look for a GPU.
+    return hands.window_environment(display, tmp_path, settings) | {device.DEVICE: "cpu"}
 
 
 @pytest.fixture

@@ -60,8 +60,8 @@ def moving(environment: dict[str, str], motion: str) -> dict[str, int]:
 @pytest.mark.slow
 @pytest.mark.window
 def test_with_reduced_motion_every_action_is_there_at_once(
-    window_environment: dict[str, str],
+    without_networks: dict[str, str],
 ) -> None:
-    assert moving(window_environment, FULL)["show_popup"] > 0  # or this test could not fail
-    still = moving(window_environment, REDUCED)
+    assert moving(without_networks, FULL)["show_popup"] > 0  # or this test could not fail
+    still = moving(without_networks, REDUCED)
     assert still == dict.fromkeys(still, 0)

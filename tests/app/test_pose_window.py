@@ -26,12 +26,12 @@ def _saved(hands: Hands, path: Path, name: str) -> Document:
 
 
 def test_handles_are_turned_chosen_and_removed_by_hand(
-    ball: Document, window_environment: dict[str, str], tmp_path: Path
+    ball: Document, without_networks: dict[str, str], tmp_path: Path
 ) -> None:
     path = tmp_path / "ball.omorph"
     save_session(ball, path)
     first, second = screen_xy(80, 60), screen_xy(102, 80)
-    with opened(window_environment, path) as hands:
+    with opened(without_networks, path) as hands:
         hands.wait(lambda: is_red(hands, 90, 100), "showing the ball")
         hands.click(*first)
         hands.wait(lambda: "edited" in hands.title(), "adding a handle")

@@ -54,6 +54,7 @@ def quick_fills(editor: Editor) -> Iterator[None]:
     editor.settings = settings
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fills")
 def test_every_command_that_changes_the_edit_is_one_step_that_undo_takes_back(
     editor: Editor, ball: Document

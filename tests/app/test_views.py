@@ -50,9 +50,9 @@ def shoot(environment: dict[str, str], out: Path, renderer: str) -> None:
 
 @pytest.mark.parametrize("renderer", ["tiles", "gl"])
 def test_views_look_as_they_did(
-    window_environment: dict[str, str], tmp_path: Path, renderer: str
+    without_networks: dict[str, str], tmp_path: Path, renderer: str
 ) -> None:
-    shoot(window_environment, tmp_path, renderer)
+    shoot(without_networks, tmp_path, renderer)
     if IS_MADE_ANEW and renderer == "tiles":
         GOLDEN.mkdir(exist_ok=True)
         for name in NAMES:
@@ -82,11 +82,11 @@ def test_the_golden_pictures_are_small() -> None:
 
 
 @pytest.fixture
-def posed(window_environment: dict[str, str], tmp_path: Path) -> Iterator[Hands]:
+def posed(without_networks: dict[str, str], tmp_path: Path) -> Iterator[Hands]:
     """Hands on a window that shows the made document."""
     session = tmp_path / "club.omorph"
     save_session(made_document(), session)
-    with opened(window_environment, session) as hands:
+    with opened(without_networks, session) as hands:
         yield hands
 
 

@@ -19,7 +19,7 @@ SHOT = "HINTING_SHOT"  # a file that the window's picture is written to, to be l
 
 
 def test_a_drag_over_the_background_says_from_where(
-    window_environment: dict[str, str], ball: Document, tmp_path: Path
+    without_networks: dict[str, str], ball: Document, tmp_path: Path
 ) -> None:
     session = tmp_path / "ball.omorph"
     save_session(ball, session)
@@ -27,7 +27,7 @@ def test_a_drag_over_the_background_says_from_where(
     assert plate is not None
     x0, y0, x1, y1 = plate.box
     middle = (x0 + x1) / 2, (y0 + y1) / 2
-    with opened(window_environment, session) as hands:
+    with opened(without_networks, session) as hands:
         hands.settle()
         hands.press("shift+b")
         hands.wait(lambda: "Clear fill sources" in hands.places(), "choosing the drag")

@@ -112,10 +112,10 @@ def test_the_whole_job_by_keyboard_alone(hands: Hands, photo_path: Path, tmp_pat
 
 
 def test_a_list_that_is_unfolded_begins_at_what_is_chosen(
-    window_environment: dict[str, str], ball: Document, tmp_path: Path
+    without_networks: dict[str, str], ball: Document, tmp_path: Path
 ) -> None:
     save_session(ball, tmp_path / "ball.omorph")
-    with opened(window_environment, tmp_path / "ball.omorph") as hands:
+    with opened(without_networks, tmp_path / "ball.omorph") as hands:
         keys = Keys(hands)
         keys.wait("Photo")
         keys.press("ctrl+e")

@@ -9,6 +9,7 @@ import pytest
 import hands
 from hands import Hands, opened
 from keyboard import Keys
+from objectmorpher_core.models import device
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
 
@@ -19,7 +20,8 @@ SIZE = (1440, 900)  # px of the screen: 720 x 450 points
 def large(display: str, tmp_path: Path) -> dict[str, str]:
     settings = 'dialogs = "built-in"\nscale = 2.0\nmotion = "reduced"\n'
     environment = hands.window_environment(display, tmp_path, settings)
-    return environment | {"OBJECTMORPHER_CACHE": str(tmp_path / "weights")}  # no network looks
+    # No network looks, and nobody for a GPU.
+    return environment | {"OBJECTMORPHER_CACHE": str(tmp_path / "weights"), device.DEVICE: "cpu"}
 
 
 def check_all_inside(user: Hands) -> None:

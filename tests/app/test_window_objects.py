@@ -44,7 +44,7 @@ def has_line(hands: Hands) -> bool:
 
 
 def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
-    window_environment: dict[str, str], editor: Editor, ball: Document, tmp_path: Path
+    without_networks: dict[str, str], editor: Editor, ball: Document, tmp_path: Path
 ) -> None:
     session = tmp_path / "balls.omorph"
     two = edits.duplicate(ball, 0)
@@ -54,7 +54,7 @@ def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
     editor.view.resize((CANVAS[2], CANVAS[3]), 1.0, editor.photo_size)
     start, end = editor.view.canvas_from_image(np.array([FIRST, TO])) + CANVAS[:2]
     editor.view.resize(size, scale, editor.photo_size)
-    with opened(window_environment, session) as hands:
+    with opened(without_networks, session) as hands:
         hands.wait(lambda: rows(hands) == ["Object 1 copy", "Object 1"], "listing")
         hands.catch_up()
         take_up(hands, "Object 1", "Object 1 copy")
@@ -83,13 +83,13 @@ def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
 
 
 def test_a_locked_object_has_no_frame_to_take_hold_of(
-    window_environment: dict[str, str], ball: Document, tmp_path: Path
+    without_networks: dict[str, str], ball: Document, tmp_path: Path
 ) -> None:
     """Neither is there a hint how to change it; one that is free can be taken from beside it."""
     session, size = tmp_path / "balls.omorph", (WIDTH, HEIGHT)
     two = edits.set_placement(edits.duplicate(ball, 0), 1, Placement(move=(50.0, 0.0)))
     save_session(hold_edits.set_locked(two, 1, True), session)
-    with opened(window_environment, session) as hands:
+    with opened(without_networks, session) as hands:
         hands.choose("row of Object 1 copy")
         hands.press("4")
         hands.area("Object 1 copy is locked")

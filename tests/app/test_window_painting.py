@@ -23,13 +23,13 @@ FAR = 60  # levels, of one colour from another
 
 
 def test_what_is_taken_from_the_wall_is_painted_on_the_turned_ball_and_erased(
-    window_environment: dict[str, str], ball: Document, tmp_path: Path
+    without_networks: dict[str, str], ball: Document, tmp_path: Path
 ) -> None:
     session = tmp_path / "ball.omorph"
     turned = edits.set_placement(ball, 0, Placement(turn=(30.0, 0.0, 0.0)))
     save_session(turned, session)
     size = ball.photo.size
-    with opened(window_environment, session) as hands:
+    with opened(without_networks, session) as hands:
 
         def colour(at: tuple[float, float]) -> np.ndarray:
             x, y = (round(v) for v in at)

@@ -22,7 +22,7 @@ PLACE_TOOL = (10, 176)  # in the Place tool's button, beside its icon
 
 
 def test_turning_by_a_ring_and_going_back(
-    window_environment: dict[str, str], editor: Editor, ball: Document, tmp_path: Path
+    without_networks: dict[str, str], editor: Editor, ball: Document, tmp_path: Path
 ) -> None:
     session = tmp_path / "ball.omorph"
     save_session(ball, session)
@@ -34,7 +34,7 @@ def test_turning_by_a_ring_and_going_back(
     assert shown is not None
     ring = shown.rings["roll"].seen(np.radians([200.0, 260.0])) + CANVAS[:2]
     editor.view.resize(size, scale, editor.photo_size)
-    with opened(window_environment, session) as hands:
+    with opened(without_networks, session) as hands:
         middle = (CANVAS[0] + 30, CANVAS[1] + 30)
         hands.xdotool("mousemove", *middle)
         hands.press("4")

@@ -13,6 +13,7 @@ from hands import Hands, opened, window_environment, x_display
 from objectmorpher.editor.view import PoseMode
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.models import device
 from objectmorpher_core.session.file import save_session
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
@@ -30,6 +31,8 @@ def on_a_small_screen(document: Document, folder: Path) -> Iterator[Hands]:
         if display is None:
             pytest.skip("no free X display was found")
         environment = window_environment(display, folder, "")
+        # No network looks, and nobody for a GPU.
+        environment |= {"OBJECTMORPHER_CACHE": str(folder / "weights"), device.DEVICE: "cpu"}
         settings = Path(environment["OBJECTMORPHER_SETTINGS"])
         settings.write_text('dialogs = "built-in"\n', encoding="utf-8")
         with opened(environment, path) as hands:

@@ -21,6 +21,8 @@ from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.pictures.image import ImageError, read_picture
 from objectmorpher_core.session.file import decode_session
 
+pytestmark = pytest.mark.slow
+
 KILLS = int(os.environ.get("OBJECTMORPHER_KILLS", "3"))  # seconds each
 HEARD = 0.02  # s in which the thread that reads the pipe hands over what it has read
 FUNCTIONS = {  # what is asked -> what the worker runs
@@ -174,7 +176,6 @@ def test_what_is_asked_for_next_does_not_wait_for_the_photo(
     wait_for_jobs(editor)
 
 
-@pytest.mark.slow
 def test_a_reading_that_did_not_stop_is_begun_again_only_once(
     editor: Editor, ball: Document
 ) -> None:
@@ -194,7 +195,6 @@ def test_a_reading_that_did_not_stop_is_begun_again_only_once(
     wait_for_jobs(editor)
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks into /proc")
 def test_killed_many_times(editor: Editor, ball: Document, tmp_path: Path) -> None:
     found = killed_at_random(editor, ball, tmp_path, KILLS)

@@ -25,6 +25,7 @@ from objectmorpher_core.scripting import runner
 from objectmorpher_core.scripting.background import PlateAhead, PlateTask
 from objectmorpher_core.scripting.options import EditScript, ScriptError, script_from
 from tests import photos, shapes
+from tests.tree import quick
 
 pytestmark = pytest.mark.usefixtures("lifted_once")
 
@@ -73,7 +74,7 @@ def plates() -> list[str]:
     return [t.name for t in threading.enumerate() if t.name.startswith("plate")]
 
 
-@pytest.mark.parametrize("options", EDITS.values(), ids=EDITS)
+@pytest.mark.parametrize("options", quick(EDITS.values(), 5), ids=EDITS)
 def test_what_was_begun_is_what_would_be_computed_afterwards(options: dict[str, object]) -> None:
     wanted = script(**options)
     photo = opened(wanted)

@@ -266,7 +266,7 @@ def _inked(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("way", quick([
     (((300, 30), (315, 70)),), (((440, 85), (459, 92)),), (((340, 120), (340, 190)),),
     (((366, 150), (375, 170)),), (((320, 310), (350, 280)),),
-], 2))  # fmt: skip
+], 1))  # fmt: skip
 def test_of_a_side_that_came_into_view_only_what_lay_under_the_brush_is_coloured(way: tuple):
     document = _placed(Placement(turn=(50.0, 0.0, 0.0)), _cup())
     stroke = Stroke(document.photo.size, Brush(8.0, 1.0))

@@ -107,6 +107,7 @@ def test_what_another_photo_shows_is_not_invented():
     assert invented[1] < 0.5 * invented[0]
 
 
+@pytest.mark.slow
 def test_a_photo_of_another_thing_is_refused():
     unlike = photo(ball(is_patterned=True), pose(5), LENS_CAMERA)
     with pytest.raises(LiftError, match="share too few details"):

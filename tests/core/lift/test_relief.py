@@ -26,7 +26,7 @@ from tests.tree import quick
 PIXEL = 1e-3  # px: u0 and means are float32
 COUNT = 3000  # Gaussians of each mask: one lift for all that is seen of it
 
-masks = pytest.mark.parametrize("name", shapes.MASKS)
+masks = pytest.mark.parametrize("name", quick(shapes.MASKS, 4))
 
 
 def _lift(inside: np.ndarray, count: int = 800, seed: int = 0, trust: float = 0.0) -> LiftedObject:
@@ -249,7 +249,7 @@ def test_a_box_has_walls_and_a_back_of_its_own():
     assert (unseen & (cosine > 0.5)).sum() > 0.2 * body.sum()
 
 
-@pytest.mark.parametrize("name", [name for name in shapes.MASKS if name != "frame"])
+@pytest.mark.parametrize("name", quick([name for name in shapes.MASKS if name != "frame"], 3))
 def test_what_is_round_has_hardly_any_walls(name):
     texture = shapes.scene(name, COUNT).lifted.texture
     outline = ReliefSilhouette.of(shapes.mask(name))

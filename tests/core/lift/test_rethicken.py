@@ -83,7 +83,7 @@ def _lifted(name: str, thickness: float) -> tuple[LiftedObject, Camera]:
     return lift_mask(shapes.picture(mask), camera, mask, "relief", settings)[1], camera
 
 
-@pytest.mark.parametrize("name", quick(["star", "box", "disc", "ellipse"], 2))
+@pytest.mark.parametrize("name", quick(["star", "box", "disc", "ellipse"], 1))
 @factors
 def test_it_is_as_a_lift_of_that_thickness(name, factor):
     """The same surface, though other points of it."""

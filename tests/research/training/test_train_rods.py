@@ -17,6 +17,8 @@ from objectmorpher_research.training.rods.vessels import make_vessel  # noqa: E4
 from objectmorpher_research.training.shape_net import WIDTH  # noqa: E402
 from objectmorpher_research.training.shapes.distance import trace  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 COUNT = 64
 
 
@@ -75,7 +77,6 @@ def test_samples_show_a_handle_of_a_vessel():
         )
 
 
-@pytest.mark.slow
 def test_it_learns_and_runs_without_torch(tmp_path):
     """Azimuths that are plain in the tokens are found in tokens that were not learned from."""
     rng = np.random.default_rng(0)

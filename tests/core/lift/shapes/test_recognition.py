@@ -43,6 +43,7 @@ from objectmorpher_core.lift.shapes.solids import (
 )
 from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_research.training.shape_eval import Surfaces, camera_of, score, surfaces_of
+from tests.tree import quick
 
 WIDTH = 0.8  # tangents, of the crop
 TANGENTS = np.array([0.05, 0.1, WIDTH], np.float32)
@@ -141,7 +142,7 @@ def as_far(found: Surfaces, true: Surfaces, mask: Mask, camera: Camera) -> Surfa
     return Surfaces(scale * front, scale * found.thickness)
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", quick(MADE, 4))
 def test_a_shape_is_recognised_and_completed(name: str) -> None:
     """Its far side, too, which neither silhouette nor network knows."""
     seen, true = seen_of(name)
@@ -230,7 +231,7 @@ def test_the_artist_says_what_it_is() -> None:
     assert recognised(seen, "free") is None
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", quick(range(8), 3))
 def test_a_drawing_is_a_sheet_and_nothing_that_light_falls_on(seed: int) -> None:
     rng = np.random.default_rng(seed)
     side, mask = 300, np.zeros((300, 300), np.uint8)

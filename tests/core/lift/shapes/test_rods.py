@@ -23,6 +23,7 @@ from objectmorpher_core.lift.shapes.solids import Mesh, RayGrid, drawn, revolved
 from objectmorpher_core.models import registry
 from objectmorpher_research.training.rods.sample import RodSample, make_sample
 from objectmorpher_research.training.shape_eval import Surfaces, surfaces_of
+from tests.tree import quick
 
 PAGE = Path(__file__).parents[4] / "docs" / "lifting" / "README.md"
 AXIS = turn_matrix(0, -15, 3)[:, 1]
@@ -48,7 +49,7 @@ def mug(azimuth: float, side: int) -> Mesh:
     return Mesh(np.concatenate([can.vertices, ring.vertices]), faces, can.axes)
 
 
-@pytest.mark.parametrize(("degrees", "side"), [(-30, 1), (30, -1), (30, 1), (0, -1)])
+@pytest.mark.parametrize(("degrees", "side"), quick([(-30, 1), (0, -1), (30, -1), (30, 1)], 2))
 def test_a_handle_lies_where_its_azimuth_says(degrees: int, side: int) -> None:
     """Also where the network that sees depth is far off there."""
     azimuth, views = float(np.radians(degrees)), list[RodView]()
