@@ -32,14 +32,14 @@ ALONG = 0.006  # x the root of the area: an edge without its strands
 # plastic 0.1 to 0.25, of plush and fur 0.2 to 0.7.
 SMOOTH, RAGGED = 0.26, 0.5
 SOFTEST = 0.004  # x the root of the area: what is less soft has no hair that one sees
-LENGTH, LONGEST = 4.5, 0.03  # of a strand: x what is soft; x the root of the area, at most
+LENGTH, LONGEST = 3.0, 0.02  # of a strand: x what is soft; x the root of the area, at most
 VARIED = 0.6, 1.3  # x that
 THICKNESS, THINNEST = 0.02, 0.4  # standard deviation: x its length; px, at least
 TAPERED = 2.2  # standard deviations in a strand
 AREA = 0.025  # x its length squared, of surface for each
-MOST = 8_000  # strands
+MOST = 6_000  # strands
 TURNED = -0.65, 0.0  # cosines at rest, between which the outline of a turned object lies
-LEANING = 38.0, 75.0  # degrees to the normal
+LEANING = 48.0, 78.0  # degrees to the normal
 DOWN, WAVY, LOOSE = 0.4, 0.35, 0.35  # what their directions are made of
 WAVE = 6.0  # radians per object unit
 ROOT = 0.25  # x a strand's length, from its root to its middle: the rest is in the surface
