@@ -22,7 +22,7 @@ from objectmorpher_core.raster.reference import Picture3D
 from tests import shapes
 from tests.core.segment.test_matte import furry
 
-SIDE = 320  # px
+SIDE = 480  # px
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +31,9 @@ def fur() -> shapes.Scene:
     fine, middle, radius, random = 4, 2 * SIDE, 0.32 * 4 * SIDE, np.random.default_rng(5)
     large = np.zeros((fine * SIDE, fine * SIDE), np.uint8)
     cv2.circle(large, (middle, middle), round(radius), (255,), -1)
-    for angle in random.uniform(0, 2 * np.pi, 500):
+    for angle in random.uniform(0, 2 * np.pi, 800):
         out = np.array([np.cos(angle), np.sin(angle)])
-        ends = radius - 4, radius + fine * random.uniform(5, 16)
+        ends = radius - 4, radius + fine * random.uniform(4, 14)
         start, end = (np.rint(middle + out * far).astype(int).tolist() for far in ends)
         cv2.line(large, start, end, (255,), int(random.integers(3, 8)))
     soft = cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)[..., None] / 255
@@ -91,18 +91,14 @@ def test_fur_is():
     assert hair_of(np.zeros((20, 30), np.float32)) is None
 
 
-@pytest.mark.parametrize("yaw", [38.0, -38.0])
+@pytest.mark.parametrize("yaw", [35.0, -35.0])
 def test_what_turns_into_view_ends_in_hair(fur, yaw):
-    """Beyond the smooth outline of its side, and with gaps."""
+    """Beyond the smooth outline of its side, and unevenly."""
     bare, hairy = (
-        _drawn(fur, lifted, yaw).alpha > 0.5 for lifted in (_shaved(fur.lifted), fur.lifted)
+        _drawn(fur, lifted, yaw).alpha.sum(1) for lifted in (_shaved(fur.lifted), fur.lifted)
     )
-    rows = np.s_[SIDE // 3 : 2 * SIDE // 3]
-    ends = [(side[rows] if yaw > 0 else side[rows, ::-1]) for side in (bare, hairy)]
-    ends = [np.array([np.flatnonzero(row)[-1] for row in side]) for side in ends]
-    assert (ends[1] >= ends[0]).all() and (ends[1] - ends[0]).max() > 3
-    steps = [np.abs(np.diff(end)).sum() for end in ends]
-    assert steps[1] > 1.3 * steps[0]
+    beyond = (hairy - bare)[SIDE // 3 : 2 * SIDE // 3]  # px, of each row
+    assert beyond.min() > -0.1 and beyond.mean() > 1 and beyond.std() > 0.4
 
 
 def test_strands_are_not_seen_at_rest_and_are_no_part_of_the_body(fur):
@@ -123,6 +119,9 @@ def test_renderers_agree_on_them(fur):
     splats = Puppet(fur.lifted, DeformSettings(), fur.camera).posed(
         None, Placement(turn=(25.0, 0.0, 0.0))
     )
-    slow = reference.render(splats, fur.texture, fur.camera, fur.camera)
-    fast = tiles.render(splats, fur.texture, fur.camera, fur.camera)
+    right = fur.camera.windowed(2 * SIDE / 3, SIDE / 3, SIDE // 5, SIDE // 4, 1.0)
+    slow, fast = (
+        renderer.render(splats, fur.texture, right, fur.camera) for renderer in (reference, tiles)
+    )
+    assert (slow.alpha > 0.5).any()
     assert np.abs(slow.color - fast.color).max() < 2 / 255
