@@ -73,9 +73,11 @@ def test_a_stroke_is_one_step_and_undone_as_one(bare: Editor, ball: Document) ->
 def test_undo_takes_back_the_stroke_that_is_not_filled_in_yet(bare: Editor, ball: Document) -> None:
     paint(bare, (20, 20), (60, 24))
     paint(bare, (20, 40), (60, 44))
-    bare.undo()
+    run(bare, "undo")
     assert bare.composing.is_repairing, "the first one goes on"
-    bare.undo()
+    assert bare.undo_label == "Repair background", "the menu names what is taken back"
+    run(bare, "undo")
+    assert bare.undo_label is None
     assert not bare.composing.is_repairing and bare.composing.painted_layer() is None
     wait_for_jobs(bare)
     assert bare.document is ball

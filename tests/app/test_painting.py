@@ -152,7 +152,7 @@ def test_undo_takes_back_the_stroke_that_is_not_on_the_object_yet(painting: Edit
     editor.apply("Turn", edits.set_placement(editor.opened, 0, Placement(turn=(40.0, 0.0, 0.0))))
     at = editor.view.canvas_from_image(np.array(AT))
     stroke(editor, ComposeTool(), at, at)
-    assert editor.painting.is_busy
+    assert editor.painting.is_busy and editor.undo_label == "Paint on the object"
     run(editor, "undo")
     assert not editor.painting.is_busy and editor.painting.painted_layer() is None
     assert editor.history.undo_label == "Turn", "nothing before it"

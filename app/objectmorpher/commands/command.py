@@ -60,8 +60,7 @@ def cannot_lift(editor: Editor) -> str | None:
 def no_undo(editor: Editor) -> str | None:
     if editor.selection.pending is not None:
         return None
-    has_step = editor.history is not None and editor.history.undo_label is not None
-    return None if has_step else t("Nothing to undo")
+    return None if editor.undo_label else t("Nothing to undo")
 
 
 def no_redo(editor: Editor) -> str | None:

@@ -190,6 +190,12 @@ class Editor(EditorState):
         self.tabs.forget_all()
         self.is_over = True
 
+    @property
+    def undo_label(self) -> str | None:
+        """Of what `undo` takes back: a stroke that is not laid yet, or the last step; or None."""
+        waiting = self.painting.waiting_label or self.composing.waiting_label
+        return waiting or (None if self.history is None else self.history.undo_label)
+
     def undo(self) -> None:
         if self.hand.abort(self) or self.history is None:
             return

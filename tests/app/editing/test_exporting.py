@@ -208,6 +208,14 @@ def test_quitting_waits_for_a_file_unless_it_is_stopped(
     moved.is_over = False
 
 
+def test_an_export_that_is_stopped_says_so(moved: Editor, tmp_path: Path) -> None:
+    path = film(moved, tmp_path)
+    moved.jobs.cancel()
+    wait_for_jobs(moved)
+    assert moved.message is not None and moved.message.text == f"{path.name} was not written"
+    assert not path.exists()
+
+
 def test_a_file_that_cannot_be_written_ends_the_waiting(moved: Editor, ball: Document) -> None:
     moved.start(ball)
     moved.exporting.export_to(Path("/nowhere/copy.png"))

@@ -272,14 +272,19 @@ class Composing:
     def _is_first(self, stroke: Stroke) -> bool:
         return bool(self._waiting) and self._waiting[0] is stroke
 
-    def take_back(self) -> str:
-        """Forget the last stroke that is not filled in yet; its label, "" for none."""
-        if not self._waiting:
-            return ""
+    @property
+    def waiting_label(self) -> str | None:
+        """Of the last stroke that is not filled in yet; None: there is none."""
+        return t("Repair background") if self._waiting else None
+
+    def take_back(self) -> str | None:
+        """Forget that stroke; its label."""
+        if (label := self.waiting_label) is None:
+            return None
         self._waiting.pop()
         if not self._waiting:
             self._editor.jobs.cancel(REPAIR)
-        return t("Repair background")
+        return label
 
     def _take_repair(self, stroke: Stroke, asked: Plate, patch: PlatePatch, backend: str) -> None:
         """A repaired part; dropped where the background is another one by now, or the stroke was

@@ -428,6 +428,7 @@ class Exporting:
             done=lambda _: editor.say(t("Exported {name} to {folder}", name=name,
                                         folder=folder_of(plan.path))),
             failed=lambda error: editor.complain_of(error.retried_by(lambda: self._start(plan))),
+            cancelled=lambda: editor.say(t("{name} was not written", name=name)),
             kind=f"{WRITE} {plan.path}",
         )  # fmt: skip
         before = editor.jobs.shown

@@ -192,15 +192,20 @@ class Painting:
         if len(self._waiting) == 1:
             self._lay()
 
-    def take_back(self) -> str:
-        """Forget the last stroke that is not on the object yet; its label, "" for none."""
-        if not self._waiting:
-            return ""
-        laid = self._waiting.pop()[1]
+    @property
+    def waiting_label(self) -> str | None:
+        """Of the last stroke that is not on the object yet; None: there is none."""
+        return _label(self._waiting[-1][1]) if self._waiting else None
+
+    def take_back(self) -> str | None:
+        """Forget that stroke; its label."""
+        if (label := self.waiting_label) is None:
+            return None
+        self._waiting.pop()
         if not self._waiting:
             self._editor.chores.cancel(PAINT)
             self._answers.forget()
-        return _label(laid)
+        return label
 
     def remove(self) -> None:
         """The current object without any paint; one step."""

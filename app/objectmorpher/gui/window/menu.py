@@ -139,8 +139,8 @@ def _draw_command(editor: Editor, name: str) -> None:
     command = COMMANDS[name]
     reason = command.why_not(editor)
     label = t(command.label)
-    if name == "undo" and editor.history and editor.history.undo_label:
-        label = t("Undo: {label}", label=editor.history.undo_label)
+    if name == "undo" and editor.undo_label:
+        label = t("Undo: {label}", label=editor.undo_label)
     if name == "redo" and editor.history and editor.history.redo_label:
         label = t("Redo: {label}", label=editor.history.redo_label)
     is_on = command.is_on is not None and command.is_on(editor)
