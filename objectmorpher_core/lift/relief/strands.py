@@ -91,7 +91,7 @@ def hair_of(alpha: F32) -> Hair | None:
     ]
     sigma = max(AROUND * scale * area / COARSE, 1e-3)
     width, length, uneven, even = (cv2.GaussianBlur(field, (0, 0), sigma) for field in coarse)
-    softness = (width / np.maximum(length, 1e-3) - CRISP) / scale
+    softness = np.asarray((width / np.maximum(length, 1e-3) - CRISP) / scale, np.float32)
     ratio = np.sqrt(uneven / np.maximum(even, 1e-9))
     ragged = ((ratio - SMOOTH) / (RAGGED - SMOOTH)).clip(0, 1)
     nearest = nearest_in(coarse[1] > 0)
