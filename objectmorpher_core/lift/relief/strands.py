@@ -2,8 +2,8 @@
 
 Where hair ends at the photo's own outline, the matte has it, strand by strand. A side that turns
 into view is a smooth surface, and would end as clay does. So strands are rooted on it, as long and
-as dense as the photo's own hair is soft and ragged: thin Gaussians in plain colours. What the photo
-has not seen is nowhere shown at rest (`raster.rules`), and so they are not.
+as dense as the photo's own hair is soft and ragged: thin Gaussians, mostly in plain colours. What
+the photo has not seen is nowhere shown at rest (`raster.rules`), and so they are not.
 """
 
 from __future__ import annotations
@@ -101,10 +101,9 @@ def hair_of(alpha: F32) -> Hair | None:
 def with_strands(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
     """`lifted` with strands of hair where the `matte` of the photo's `camera` has some.
 
-    The same object where there is none, and where its other side shows the photo.
+    The same object where there is none. Where its other side shows the photo, so do they.
     """
-    hair = None if lifted.splatting != "edged solid" else hair_of(matte.alpha)
-    if hair is None:
+    if (hair := hair_of(matte.alpha)) is None:
         return lifted
     rest, rng = RestSplats(lifted, camera), np.random.default_rng(seed)
     area = float(np.count_nonzero(matte.alpha > 0.5)) ** 0.5
@@ -136,7 +135,6 @@ class _Growth:
         lifted, count = self.lifted, len(self.roots)
         strands = self._strands(rng)
         gaussians, texture, sides = lifted.gaussians, lifted.texture, lifted.sides
-        looks = camera.project(lifted.world_points(strands.means))
         nothing, whole = np.zeros(count), np.ones(count)
         if sides is not None:
             none = np.zeros((count, 2)), np.zeros((count, 2, 3)), nothing
@@ -151,7 +149,7 @@ class _Growth:
                 ))
             ),
             texture=PhotoTexture(
-                _joined(texture.u0, looks), _joined(texture.visibility, nothing),
+                _joined(texture.u0, texture.u0[self.roots]), _joined(texture.visibility, nothing),
                 _joined(texture.solidity, whole),
             ),
             middle=None if lifted.middle is None
