@@ -186,8 +186,8 @@ class LiftSettings:
 
 AS_SEEN = LiftSettings()
 
+HAIR = 0.998  # opacity of a relief's strands of hair: all else of it has 1
 # see raster/rules.py
-HAIR, EXACT = 0.998, 5e-4  # opacity of a relief's strands of hair: all else of it has 1
 SPLATTINGS = ("surface", "solid", "edged surface", "edged solid", "mip", "classic")
 
 
@@ -250,7 +250,7 @@ class LiftedObject:
     def is_hair(self) -> Mask:
         """(N,) which Gaussians are strands on its sides."""
         is_relief = self.splatting.startswith("edged")
-        return is_relief & (np.abs(self.gaussians.opacities - HAIR) < EXACT)
+        return is_relief & (self.gaussians.opacities == np.float32(HAIR))
 
     @cached_property
     def scale(self) -> float:

@@ -202,11 +202,13 @@ class Editor(EditorState):
         if self.tasks.question is not None:
             self.jobs.cancel(SELECT)
             return
-        if label := self.painting.take_back() or self.composing.take_back():
-            self.say(t("Undone: {label}", label=label))
-            return
-        label = self.history.undo_label
+        label = self.undo_label
         text = t("Undone: {label}", label=label) if label else t("Nothing to undo")
+        for strokes in (self.painting, self.composing):
+            if strokes.waiting_label is not None:
+                strokes.take_back()
+                self.say(text)
+                return
         self._travel(self.history.undo, text)
 
     def redo(self) -> None:

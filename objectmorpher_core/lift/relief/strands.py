@@ -31,6 +31,7 @@ ALONG = 0.006  # x the root of the area: an edge without its strands
 # Root mean square slope of alpha along the outline over that across it: of cloth, leather and
 # plastic 0.1 to 0.25, of plush and fur 0.2 to 0.7.
 SMOOTH, RAGGED = 0.26, 0.5
+HAIRY = 0.2  # mean of that over an outline, below which it is nicked here and there, and not hairy
 SOFTEST = 0.004  # x the root of the area: what is less soft has no hair that one sees
 LENGTH, LONGEST = 3.0, 0.02  # of a strand: x what is soft; x the root of the area, at most
 VARIED = 0.6, 1.3  # x that
@@ -53,6 +54,8 @@ class Hair(NamedTuple):
     soft: F32  # (h, w) px of the photo, by which it is softer than a crisp edge
     ragged: F32  # (h, w) in [0, 1], how surely it ends in hair
     scale: float  # cells per px of the photo
+    root: float  # px of the photo, of the object's area
+    mean: float  # of `ragged`, over the outline
 
     def at(self, xy: F64) -> tuple[F64, F64]:
         """Softness and raggedness (n,) at px (n, 2) of the matte."""
@@ -94,8 +97,10 @@ def hair_of(alpha: F32) -> Hair | None:
     softness = np.asarray((width / np.maximum(length, 1e-3) - CRISP) / scale, np.float32)
     ratio = np.sqrt(uneven / np.maximum(even, 1e-9))
     ragged = ((ratio - SMOOTH) / (RAGGED - SMOOTH)).clip(0, 1)
-    nearest = nearest_in(coarse[1] > 0)
-    return Hair(softness.ravel()[nearest], ragged.ravel()[nearest], size[0] / alpha.shape[1])
+    outline = coarse[1] > 0
+    nearest, mean = nearest_in(outline), float(ragged[outline].mean())
+    coarser = size[0] / alpha.shape[1]
+    return Hair(softness.ravel()[nearest], ragged.ravel()[nearest], coarser, area, mean)
 
 
 def with_strands(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
@@ -103,15 +108,14 @@ def with_strands(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int =
 
     The same object where there is none. Where its other side shows the photo, so do they.
     """
-    if (hair := hair_of(matte.alpha)) is None:
+    if (hair := hair_of(matte.alpha)) is None or hair.mean < HAIRY:
         return lifted
     rest, rng = RestSplats(lifted, camera), np.random.default_rng(seed)
-    area = float(np.count_nonzero(matte.alpha > 0.5)) ** 0.5
     soft, ragged = hair.at(np.asarray(lifted.texture.u0 - [matte.left, matte.top], np.float64))
     px = 1 / (rest.zoom * lifted.scale)  # object units
-    length = np.minimum(LENGTH * soft, LONGEST * area) * px
+    length = np.minimum(LENGTH * soft, LONGEST * hair.root) * px
     is_turned = (rest.cosines > TURNED[0]) & (rest.cosines < TURNED[1])
-    roots = np.flatnonzero(lifted.is_body & is_turned & (soft > SOFTEST * area) & (ragged > 0))
+    roots = np.flatnonzero(lifted.is_body & is_turned & (soft > SOFTEST * hair.root) & (ragged > 0))
     if not len(roots):
         return lifted
     wanted = ragged[roots] * lifted.spacing**2 / (AREA * length[roots] ** 2)

@@ -277,14 +277,11 @@ class Composing:
         """Of the last stroke that is not filled in yet; None: there is none."""
         return t("Repair background") if self._waiting else None
 
-    def take_back(self) -> str | None:
-        """Forget that stroke; its label."""
-        if (label := self.waiting_label) is None:
-            return None
+    def take_back(self) -> None:
+        """Forget that stroke."""
         self._waiting.pop()
         if not self._waiting:
             self._editor.jobs.cancel(REPAIR)
-        return label
 
     def _take_repair(self, stroke: Stroke, asked: Plate, patch: PlatePatch, backend: str) -> None:
         """A repaired part; dropped where the background is another one by now, or the stroke was

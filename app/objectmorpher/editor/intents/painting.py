@@ -197,15 +197,12 @@ class Painting:
         """Of the last stroke that is not on the object yet; None: there is none."""
         return _label(self._waiting[-1][1]) if self._waiting else None
 
-    def take_back(self) -> str | None:
-        """Forget that stroke; its label."""
-        if (label := self.waiting_label) is None:
-            return None
+    def take_back(self) -> None:
+        """Forget that stroke."""
         self._waiting.pop()
         if not self._waiting:
             self._editor.chores.cancel(PAINT)
             self._answers.forget()
-        return label
 
     def remove(self) -> None:
         """The current object without any paint; one step."""
