@@ -21,6 +21,7 @@ from ...document.settings import Hint
 from ...document.transparency import alpha_behind
 from .. import Inpainter, InpaintError, LooksFar, TakesHints
 from ..blend import Box, distance
+from .loose_hair import find_loose_hair
 from .residue import (
     BLACK,
     TINTED,
@@ -90,8 +91,8 @@ def build_plate(
         raise InpaintError("the object is too thin to be cut out of the photo")
     height, width = covered.shape
     margin = hole_margin(width, height)
-    residue = find_residue(pixels, covered, margin)
-    away = distance(covered | residue)
+    residue, hair = (find(pixels, covered, margin) for find in (find_residue, find_loose_hair))
+    away = distance(covered | residue | hair)
     hole = away < margin
     rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
     box = (int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
@@ -108,7 +109,7 @@ def build_plate(
     fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
     if residue.any():
         residue[inner] = visible_residue(residue[inner], photo, fill)
-        away = distance(covered | residue)
+        away = distance(covered | residue | hair)
     weight = fill_weight(away[inner].copy(), margin)
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true

@@ -170,6 +170,8 @@ MOVED = (1.0, 6.0)  # px of the photo: from here on it begins to be shown, and f
 STEPS = 4  # in which it appears
 NEAREST = 4  # control points that say how what stands beside it has moved
 SHADE, TINTED = 0.25, 0.4  # tint, up to which a ghost is a shadow, and up to which it may be one
+SPARSE = 0.35  # mean over nearly the most darkening, up to which a ghost may be hair ...
+FOOT = 0.75  # ... unless it lies so much below its owner, of [-1, 1]
 BLACK = 0.02  # of sRGB's range, added before ratios are taken
 
 
@@ -217,19 +219,27 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
         row, column = np.unravel_index(int(np.argmin(gaps[owner])), there.shape)
         foot = np.array([column + x0 + plate.left, row + y0 + plate.top])
         points = _nearest_points(document.objects[owner], document.photo.camera, foot)
-        ghosts.append(Ghost(box, there, owner, points, _tint(document, plate, box, there)))
+        tint = _tint(document, plate, box, there, away[owner][inner])
+        ghosts.append(Ghost(box, there, owner, points, tint))
     return tuple(ghosts)
 
 
-def _tint(document: Document, plate: Plate, box: Box, there: Mask) -> float:
-    """Return `Ghost.tint` of what is `there` (h, w) in a box of the plate."""
+def _tint(document: Document, plate: Plate, box: Box, there: Mask, away: F32) -> float:
+    """Return `Ghost.tint` of what is `there` (h, w) in a box of the plate.
+
+    `away` (h, w) px from its owner. Hair darkens little of where it is, and not at the foot.
+    """
     x0, y0, x1, y1 = box
     photo = document.photo.pixels[plate.top : plate.box[3], plate.left : plate.box[2]]
     seen, behind = (
-        unit_pixels(image[y0:y1, x0:x1][there]).mean(0) + BLACK for image in (photo, plate.pixels)
+        unit_pixels(image[y0:y1, x0:x1][there]) + BLACK for image in (photo, plate.pixels)
     )
-    change = np.log(seen / behind)
-    return float(tint_of(change)) if change.max() < 0 else np.inf
+    change = np.log(seen.mean(0) / behind.mean(0))
+    darker = np.log(behind / seen).mean(-1)
+    is_sparse = darker.mean() < SPARSE * np.quantile(darker, 0.95)
+    down = cv2.Sobel(away, cv2.CV_32F, 0, 1, scale=1 / 8)
+    is_hair = is_sparse and down[there].mean() < FOOT
+    return float(tint_of(change)) if change.max() < 0 and not is_hair else np.inf
 
 
 def tint_of(darker: np.ndarray) -> np.ndarray:
