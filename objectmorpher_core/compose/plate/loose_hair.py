@@ -27,8 +27,8 @@ LEAST = 1.6  # levels of L by which a hair's middle stands out ...
 TIMES, AROUND = 3.0, 5.0  # ... and x what is usual within so many hole margins
 GOES_ON, SURE = 0.45, 0.15  # x that level: a hair goes on; share of it that is above
 APART, UNLIKE = 3.0, 1.0  # px to both its sides, which differ by less than this x its contrast
-SHORTEST, GAP = 9, 4  # px
-FULL, WITHIN = 0.004, 5.0  # share of other lines within so many hole margins, at most
+SHORTEST, GAP, JOINED = 9, 2, 4  # px; what is found may have wider gaps
+FULL, WITHIN = 0.007, 5.0  # share of other lines within so many hole margins, at most
 FILLS = (32.0, 8.0, 2.0)  # px of blur, with which what is covered becomes its surroundings
 
 
@@ -82,7 +82,7 @@ def _hair(light: F32, hides: Mask, margin: float) -> Mask:
     keeps = may_be & (full < FULL) & (strong >= SURE * length)
     keeps &= (length >= SHORTEST) & (extent >= SHORTEST)
     keeps[0] = False
-    hair = cv2.morphologyEx((keeps[labels] & line).astype(np.uint8), cv2.MORPH_CLOSE, disc(GAP))
+    hair = cv2.morphologyEx((keeps[labels] & line).astype(np.uint8), cv2.MORPH_CLOSE, disc(JOINED))
     return np.asarray(cv2.dilate(hair, disc(1)) > 0)
 
 

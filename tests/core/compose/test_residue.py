@@ -145,13 +145,15 @@ def _hairs(seed: int, count: int = 12) -> tuple[F32, Mask]:
         cv2.polylines(cover, [np.rint(2 * lines.T).astype(np.int32)], False, 255, 2, cv2.LINE_AA)
         cv2.polylines(middle, [np.rint(lines.T).astype(np.int32)], False, 1)
     small = cv2.resize(cover, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    return np.asarray(small / np.float32(255)), (middle > 0) & ~DISC
+    return np.asarray(small / np.float32(255), np.float32), np.asarray((middle > 0) & ~DISC)
 
 
 def _ground(name: str, rng: np.random.Generator) -> F32:
     """(h, w, 3) levels of a background, out of focus unless it is one of scikit-image's."""
     if name in ("brick", "grass", "gravel"):
         picture = np.repeat(getattr(data, name)()[:HEIGHT, :WIDTH, None], 3, 2)
+    elif name in ("wood", "street"):
+        picture = _background(name)
     elif name == "edge":  # of a table, which ends at the object
         picture = np.full((HEIGHT, WIDTH, 3), 90.0)
         picture[200:] = 170
@@ -180,7 +182,9 @@ def test_hair_that_begins_at_the_object_is_found(tone: float):
     assert max(replaced) < 0.001  # of the photo, where no hair is
 
 
-@pytest.mark.parametrize("ground", ["blurred", "brick", "grass", "gravel", "edge", "wire"])
+@pytest.mark.parametrize(
+    "ground", ["blurred", "brick", "grass", "gravel", "wood", "street", "edge", "wire"]
+)
 def test_the_lines_of_a_background_are_no_hair(ground: str):
     pixels = _ground(ground, np.random.default_rng(0))
     pixels[DISC] = 30
