@@ -259,22 +259,6 @@ def trained(checkpoint: Path) -> ShapeNet:
     return net.eval()
 
 
-def blended(net: ShapeNet, start: dict[str, Tensor], share: float) -> ShapeNet:
-    """Mix `share` of a network that went on from the weights `start` with them.
-
-    What lies between the two has forgotten less of what only the earlier samples show, and has
-    learned most of what the later ones do (Wortsman et al. 2022, Robust fine-tuning of zero-shot
-    models).
-    """
-    mixed = {
-        name: torch.lerp(start[name], value, share) if value.is_floating_point() else value
-        for name, value in net.state_dict().items()
-    }
-    blend = ShapeNet()
-    blend.load_state_dict(mixed)
-    return blend.eval()
-
-
 def figures(checkpoint: Path, net: ShapeNet) -> dict[str, Any]:
     """Scores on samples that were never trained on, by family and in all, and the curve."""
     kept = torch.load(checkpoint, map_location="cpu", weights_only=True)
