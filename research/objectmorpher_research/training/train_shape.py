@@ -118,11 +118,11 @@ def train(
     files = [
         file
         for own in plan.sets
-        for file in _samples(
+        for file in write_shards(
             folder / "samples", own.seed * APART, own.samples, progress, own.families or None
         )
     ]
-    _samples(folder / "unseen", UNSEEN, CHECKED, progress)
+    write_shards(folder / "unseen", UNSEEN, CHECKED, progress)
     state = _State.resumed(folder, plan, start)
     begun = saved = time.monotonic()
     for batch in _endless(files, plan, state.step):
@@ -135,14 +135,6 @@ def train(
             saved = time.monotonic()
     state.save()
     return state.file
-
-
-def _samples(
-    folder: Path, first: int, count: int, progress: Progress,
-    families: tuple[str, ...] | None = None,
-) -> list[Path]:  # fmt: skip
-    write_shards(folder, first, count, progress, families)
-    return [folder / f"{seed:08d}.npz" for seed in range(first, first + count, SHARD)]
 
 
 def _endless(files: list[Path], plan: TrainingPlan, done: int) -> Iterator[Batch]:
