@@ -33,8 +33,7 @@ from objectmorpher_core.pipeline import lift_mask, open_photo
 from objectmorpher_core.scripting.options import EditScript
 from objectmorpher_core.scripting.runner import with_plate
 
-from .cases import TruthCase, TruthGuidance
-from .outcome import EditOutcome
+from .cases import EditOutcome, TruthCase, TruthGuidance
 
 OWN, CARD, PLAIN = "own", "card", "plain"  # what is lifted
 LIFTS = {

@@ -9,10 +9,9 @@ from objectmorpher_core.base.arrays import RGB
 from objectmorpher_core.document.model import Matte
 
 from . import flat_methods
-from .cases import TruthCase
+from .cases import EditOutcome, TruthCase
 from .chain import CARD, PLAIN, Chain, Way
 from .lifted_mesh import draw_mesh
-from .outcome import EditOutcome
 
 
 @dataclass(frozen=True, eq=False)
