@@ -16,8 +16,7 @@ from .base.progress import Progress, silent
 from .compose.plate import inpaint_latent
 from .compose.refine import klein, qwen
 from .compose.refine.diffusion import DiffusionRefiner
-from .lift.trellis.lifter import TrellisLifter
-from .lift.triposplat.lifter import TripoSplatLifter
+from .lift.trellis.lifter import TrellisLifter, TripoSplatLifter
 from .models import HubModel, ModelError, ModelSet, depth_net, device
 from .models.device import Device
 from .models.ledger import Ledger, Model

@@ -33,8 +33,8 @@ from objectmorpher_core.compose.plate import inpaint_latent, latent_diffusion
 from objectmorpher_core.compose.refine import klein, qwen
 from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
 from objectmorpher_core.lift.trellis import lifter
+from objectmorpher_core.lift.trellis.lifter import FEWEST, TripoSplatLifter
 from objectmorpher_core.lift.triposplat import generator, networks
-from objectmorpher_core.lift.triposplat.lifter import FEWEST, TripoSplatLifter
 from objectmorpher_core.models import depth_net
 from objectmorpher_core.models.plans import RESIDENT, Need, Network, PipelineNeed, Way
 from objectmorpher_core.segment.sam import sam_torch

@@ -284,16 +284,6 @@ class Deformer:
         return Solution(Pose(positions, rotations), minimum.energies)
 
     @_alone
-    def iterated(self, handles: tuple[Handle, ...], iterations: int, base: Base = USUAL) -> Pose:
-        """The pose after so many plain iterations from rest, settled or not: for comparisons."""
-        handles = self._effective(handles)
-        if not handles:
-            return self.rest()
-        self._constrain(handles, base)
-        minimum = iterate(self._solver, self.rest().rotations, iterations)
-        return Pose(*self._follow(minimum.positions, minimum.rotations, self.rest()))
-
-    @_alone
     def prepare(self, handles: tuple[Handle, ...], base: Base = USUAL) -> None:
         """Does now what the first solve with these handles would do: their factorisation."""
         if handles := self._effective(handles):

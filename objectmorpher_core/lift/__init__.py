@@ -49,7 +49,7 @@ BACKENDS = {  # imported when chosen
     "relief": "objectmorpher_core.lift.relief.lifter:ReliefLifter",
     "trellis": "objectmorpher_core.lift.trellis.lifter:TrellisLifter",
     "cupid": "objectmorpher_core.lift.trellis.lifter:CupidLifter",
-    "triposplat": "objectmorpher_core.lift.triposplat.lifter:TripoSplatLifter",
+    "triposplat": "objectmorpher_core.lift.trellis.lifter:TripoSplatLifter",
 }
 
 

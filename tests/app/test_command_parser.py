@@ -20,7 +20,7 @@ SAID = {
     "wibble photo.jpg": "no file wibble: edit, batch, select",
     "models": "models needs one of list, get, path, verify, add, remove",
     "bench": "bench needs one of deform, render, pipeline",
-    "evaluate": "evaluate needs one of metrics, truth, ablation",
+    "evaluate": "evaluate needs one of metrics, truth, paper",
     "completion fish": "there is no 'fish' here: bash, zsh, tcsh",
     "edit a.png -o b.png --turn 1,2,3,4": "'1,2,3,4' is not 1 to 3 numbers with commas",
     "models lst": "there is no 'lst' here, did you mean list?: list, get",

@@ -1,6 +1,6 @@
-"""TRELLIS and CUPID as lifters: the object is made, found in the photo, and given the photo back.
+"""TRELLIS and its kin as lifters: the object is made, found in the photo, and given the photo back.
 
-Where TRELLIS's object stands is looked for; CUPID's network says it itself.
+Where an object of TRELLIS or TripoSplat stands is looked for; CUPID's network says it itself.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...base.camera import Camera
 from ...base.progress import Progress, part
 from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings
-from ...models import ModelError, ledger
+from ...models import ModelError, ledger, not_installed
 from ...models.plans import Need
 from ...models.weight_folder import count_parameters
 from ...splat_files.splats.ply import QUARTER_TURN, turned
@@ -40,6 +40,7 @@ GUIDANCE = 7.5, 3.0  # of the flows, from the same place
 UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 FITS = 0.85  # score from which a pose that the network says itself is not looked for again
 SPLATTING = "mip"  # as its Gaussians were trained
+FEWEST, MOST = 1 << 15, 1 << 18  # Gaussians of TripoSplat, as published
 
 
 class TrellisLifter:
@@ -71,8 +72,6 @@ class TrellisLifter:
         self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
         """The object in our axes, and what is known of its pose."""
-        from .picture import ConditionPicture
-
         picture = ConditionPicture.of(subject.matte)
         made = self.make(lambda g: g.make(picture, progress, seed, example_sampling(g)))
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP)
@@ -146,8 +145,7 @@ class CupidLifter(TrellisLifter):
     ids = (configs.CUPID, configs.ENCODER, configs.TRELLIS)
 
     def _new_generator(self, folders: tuple[Path, ...], plan: Plan) -> Any:
-        from .cupid import CupidGenerator
-        from .generator import Folders
+        from .generator import CupidGenerator, Folders
 
         return CupidGenerator(Folders(*folders), plan)
 
@@ -169,6 +167,32 @@ class CupidLifter(TrellisLifter):
         assert made.view is not None
         start = pose_seen(made.view, picture, subject.camera)
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP, start=start)
+
+
+class TripoSplatLifter(TrellisLifter):
+    """Image to 3D, in as many Gaussians as are asked for. Its encoder has a licence of its own."""
+
+    name, title = "triposplat", "TripoSplat"
+    ids = (configs.TRIPOSPLAT,)
+    parameters = 2_500_000_000  # of 1.58; the encoders twice: they stay in single precision
+    work = 3 << 30  # bytes beside the weights, estimated
+
+    def missing(self) -> str | None:
+        """See `Lifter`."""
+        return not_installed(("diffusers",)) or super().missing()
+
+    def _new_generator(self, folders: tuple[Path, ...], plan: Plan) -> Any:
+        from ..triposplat.generator import TripoSplatGenerator
+
+        return TripoSplatGenerator(folders[0], plan)
+
+    def _made(
+        self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int
+    ) -> tuple[Gaussians, Hints]:
+        picture = ConditionPicture.of(subject.matte)
+        count = min(max(settings.count, FEWEST), MOST)
+        made = self.make(lambda generator: generator.make(picture, count, progress, seed))
+        return turned(made, QUARTER_TURN), Hints(up=UP)
 
 
 def pose_seen(seen: Framing, picture: ConditionPicture, camera: Camera) -> F64 | None:

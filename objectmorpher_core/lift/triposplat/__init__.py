@@ -2,6 +2,6 @@
 
 As many as are asked for: they are drawn from a density that an octree says. Names of parameters
 are those of the published weights, which are MIT but for those of the encoder that they were
-trained with, DINOv3's: https://github.com/VAST-AI-Research/TripoSplat. The lifter is imported
-without torch.
+trained with, DINOv3's: https://github.com/VAST-AI-Research/TripoSplat. The lifter is beside
+TRELLIS's.
 """

@@ -14,7 +14,7 @@ from objectmorpher.cli.terminal import UsageError, progress_bar
 from .figures import cell, number, numbers
 from .paper import add_paper, run_paper
 from .study import add_results, add_study, run_results, run_study
-from .truth import add_ablation, add_truth, run_made
+from .truth import add_truth, run_truth
 
 if TYPE_CHECKING:
     from ..evaluation.metrics import Results
@@ -30,9 +30,8 @@ def add_evaluate(parser: argparse.ArgumentParser) -> None:
     add_subcommands(parser, "what", (
         Subcommand("metrics", measures, _add_metrics, _run_metrics),
         Subcommand(
-            "truth", "edits whose true result is known, and other methods", add_truth, run_made
+            "truth", "edits whose true result is known, and other methods", add_truth, run_truth
         ),
-        Subcommand("ablation", "the same edits with one part otherwise", add_ablation, run_made),
         Subcommand("paper", "the paper's table of several methods' results", add_paper, run_paper),
         Subcommand("study", "a page on which people judge results", add_study, run_study),
         Subcommand(

@@ -50,8 +50,6 @@ def _add_shape(parser: argparse.ArgumentParser) -> None:
     add("--passes", type=float, default=4.0, metavar="P", help="over all of them")
     add("--hold-out", type=_words, metavar="A,B", help="families that are not trained on")
     add("--start", type=Path, metavar="ONNX", help="exported weights to go on from")
-    add("--blend", type=float, default=1.0, metavar="X",
-        help="share of the trained weights; the rest are those of --start")  # fmt: skip
     add("--seed", type=int, default=0, help="0 to 49; another seed draws other samples")
     add("--also", action="append", default=[], metavar="SEED:N[:A,B]",
         help="N samples of another seed as well, of these families only")  # fmt: skip
@@ -318,10 +316,9 @@ def _train_shape(options: argparse.Namespace) -> None:
     """Makes samples, trains, measures, and writes weights and figures."""
     _check_installed()
     from ..training import flatness
-    from ..training.export_shape import export, weights_of
-    from ..training.shape_net import ShapeNet
+    from ..training.export_shape import export
     from ..training.shapes.families import FAMILIES
-    from ..training.train_shape import SampleSet, TrainingPlan, blended, figures, train, trained
+    from ..training.train_shape import SampleSet, TrainingPlan, figures, train, trained
 
     held_out = tuple(options.hold_out or ())
     also = []
@@ -336,20 +333,16 @@ def _train_shape(options: argparse.Namespace) -> None:
         raise UsageError(f"there is no family {unknown[0]!r}; there are {', '.join(FAMILIES)}")
     if options.start is not None and not options.start.is_file():
         raise UsageError(f"there is no file {options.start}")
-    if not 0 < options.blend <= 1 or (options.blend < 1 and options.start is None):
-        raise UsageError("--blend is above 0 and at most 1, and goes with --start")
     plan = TrainingPlan(
         options.samples, options.passes, held_out=held_out, seed=options.seed, also=tuple(also)
     )
     with progress_bar("training") as progress:
         checkpoint = train(options.folder, plan, options.minutes, progress, options.start)
     net = trained(checkpoint)
-    if options.start is not None and options.blend < 1:
-        net = blended(net, weights_of(options.start, ShapeNet()), options.blend)
     with progress_bar("what is flat") as progress:
         files = sorted((options.folder / "samples").glob("*.npz"))
         flatness.fit(net.flat, flatness.samples_of(files, progress))
-    found = {**figures(checkpoint, net), "blend": options.blend}
+    found = figures(checkpoint, net)
     weights = options.output or options.folder / "shape.onnx"
     found["sha256"] = export(net, weights)
     report = options.report or weights.with_suffix(".json")

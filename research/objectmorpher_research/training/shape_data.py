@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -45,29 +45,42 @@ class Batch:
     away: Tensor  # (n, 1, 1, 1) crop units to the mean of the object
 
 
+def make_files(
+    write: Callable[[Any], None], jobs: Sequence[tuple[Any, ...]], holds: tuple[int, str],
+    progress: Progress,
+) -> list[Path]:  # fmt: skip
+    """The files that come first in `jobs`; `write` makes those that are not there, in all cores.
+
+    `holds`: how many of what are in each.
+    """
+    (each, what), wanted = holds, [job for job in jobs if not job[0].exists()]
+    # Spawned, not forked: a copy of a process whose networks have threads may never end.
+    apart = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(os.cpu_count(), apart, cv2.setNumThreads, (1,)) as pool:
+        for done, _ in enumerate(pool.map(write, wanted), 1):
+            progress(done / len(wanted), f"{done * each} of {len(wanted) * each} {what}")
+    return [job[0] for job in jobs]
+
+
+def write_arrays(file: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write a file of arrays, whole or not at all."""
+    partial = file.with_suffix(".part")
+    with partial.open("wb") as out:
+        np.savez(out, allow_pickle=False, **arrays)
+    partial.rename(file)
+
+
 def write_shards(
     folder: Path, first: int, count: int, progress: Progress = silent,
     families: tuple[str, ...] | None = None,
-) -> None:  # fmt: skip
-    """Files of samples with the seeds first.., those that are not there yet, in all cores.
-
-    `families`: the only ones drawn.
-    """
+) -> list[Path]:  # fmt: skip
+    """Files of samples with the seeds first..; `families`: the only ones drawn."""
     folder.mkdir(parents=True, exist_ok=True)
-    wanted = [
+    jobs = [
         (folder / f"{seed:08d}.npz", range(seed, seed + SHARD), families)
         for seed in range(first, first + count, SHARD)
-        if not (folder / f"{seed:08d}.npz").exists()
     ]
-    # Spawned, not forked: a copy of a process whose networks have threads may never end.
-    apart = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(os.cpu_count(), apart, _begin) as pool:
-        for number, _ in enumerate(pool.map(_write, wanted), 1):
-            progress(number / len(wanted), f"{number * SHARD} of {len(wanted) * SHARD} samples")
-
-
-def _begin() -> None:
-    cv2.setNumThreads(1)
+    return make_files(_write, jobs, (SHARD, "samples"), progress)
 
 
 def _write(job: tuple[Path, range, tuple[str, ...] | None]) -> None:
@@ -76,10 +89,7 @@ def _write(job: tuple[Path, range, tuple[str, ...] | None]) -> None:
     arrays = packed(samples)
     rgb = np.stack([s.rgb for s in samples])
     arrays["tokens"], arrays[MIRRORED] = _tokens(rgb), _tokens(rgb[:, :, ::-1])
-    partial = file.with_suffix(".part")
-    with partial.open("wb") as out:
-        np.savez(out, allow_pickle=False, **arrays)
-    partial.rename(file)
+    write_arrays(file, arrays)
 
 
 def packed(samples: list[Sample]) -> dict[str, np.ndarray]:

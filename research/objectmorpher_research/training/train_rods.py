@@ -6,12 +6,9 @@ that are missing, and trains anew, which takes minutes.
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 from torch import Tensor
@@ -22,7 +19,7 @@ from objectmorpher_core.lift.shapes.rod_look import GRID, UNIT, planes_of
 from .export_shape import write_onnx
 from .rod_net import RodCommittee, RodNet
 from .rods.sample import RodSample, make_sample
-from .shape_data import _tokens
+from .shape_data import _tokens, make_files, write_arrays
 from .shape_net import WIDTH
 from .train_shape import follow, schedule
 
@@ -70,21 +67,13 @@ def write_rods(folder: Path, plan: RodPlan, progress: Progress = silent) -> list
     folder.mkdir(parents=True, exist_ok=True)
     first = plan.seed * 1_000_000
     seeds = range(first, first + plan.samples, SHARD)
-    files = [folder / f"{seed:08d}.npz" for seed in seeds]
-    wanted = [job for job in zip(files, seeds, strict=True) if not job[0].exists()]
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        for done, _ in enumerate(pool.map(_write, wanted), 1):
-            progress(done / len(wanted), f"{done * SHARD} of {len(wanted) * SHARD} handles")
-    return files
+    jobs = [(folder / f"{seed:08d}.npz", seed) for seed in seeds]
+    return make_files(_write, jobs, (SHARD, "handles"), progress)
 
 
 def _write(job: tuple[Path, int]) -> None:
     file, seed = job
-    cv2.setNumThreads(1)
-    partial = file.with_suffix(".part")
-    with partial.open("wb") as out:
-        np.savez(out, allow_pickle=False, **packed([make_sample(seed + k) for k in range(SHARD)]))
-    partial.rename(file)
+    write_arrays(file, packed([make_sample(seed + k) for k in range(SHARD)]))
 
 
 def packed(samples: list[RodSample]) -> dict[str, np.ndarray]:

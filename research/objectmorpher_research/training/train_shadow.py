@@ -10,7 +10,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import time
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing.queues import Queue
 from pathlib import Path
@@ -32,6 +31,7 @@ from .shadows.grounds import Grounds
 from .shadows.samples import ShadowSample, make_sample
 from .shadows.scenes import SceneGeometry, make_geometry, packed, unpacked
 from .shadows.solids import silhouettes
+from .shape_data import make_files, write_arrays
 from .train_shape import follow, schedule
 
 SHARD = 64  # scenes in a file, and samples that are handed over at once
@@ -67,24 +67,18 @@ class ShadowLosses(NamedTuple):
 def write_scenes(folder: Path, plan: ShadowPlan, progress: Progress = silent) -> list[Path]:
     """Files of scenes, those that are not there yet, in all cores."""
     folder.mkdir(parents=True, exist_ok=True)
-    numbers = range(-(-plan.scenes // SHARD))
-    files = [folder / f"{plan.seed:02d}-{number:05d}.npz" for number in numbers]
-    wanted = [(f, plan.seed, n) for f, n in zip(files, numbers, strict=True) if not f.exists()]
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        for done, _ in enumerate(pool.map(_write, wanted), 1):
-            progress(done / len(wanted), f"{done * SHARD} of {len(wanted) * SHARD} scenes")
-    return files
+    jobs = [
+        (folder / f"{plan.seed:02d}-{number:05d}.npz", plan.seed, number)
+        for number in range(-(-plan.scenes // SHARD))
+    ]
+    return make_files(_write, jobs, (SHARD, "scenes"), progress)
 
 
 def _write(job: tuple[Path, int, int]) -> None:
     file, seed, number = job
-    cv2.setNumThreads(1)
     shapes = silhouettes(BOARDS, BOARDS_SEED)
     scenes = [make_geometry(np.random.default_rng([seed, number, k]), shapes) for k in range(SHARD)]
-    partial = file.with_suffix(".part")
-    with partial.open("wb") as out:
-        np.savez(out, allow_pickle=False, **packed(scenes))
-    partial.rename(file)
+    write_arrays(file, packed(scenes))
 
 
 @dataclass(eq=False)

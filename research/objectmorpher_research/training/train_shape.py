@@ -118,11 +118,11 @@ def train(
     files = [
         file
         for own in plan.sets
-        for file in _samples(
+        for file in write_shards(
             folder / "samples", own.seed * APART, own.samples, progress, own.families or None
         )
     ]
-    _samples(folder / "unseen", UNSEEN, CHECKED, progress)
+    write_shards(folder / "unseen", UNSEEN, CHECKED, progress)
     state = _State.resumed(folder, plan, start)
     begun = saved = time.monotonic()
     for batch in _endless(files, plan, state.step):
@@ -135,14 +135,6 @@ def train(
             saved = time.monotonic()
     state.save()
     return state.file
-
-
-def _samples(
-    folder: Path, first: int, count: int, progress: Progress,
-    families: tuple[str, ...] | None = None,
-) -> list[Path]:  # fmt: skip
-    write_shards(folder, first, count, progress, families)
-    return [folder / f"{seed:08d}.npz" for seed in range(first, first + count, SHARD)]
 
 
 def _endless(files: list[Path], plan: TrainingPlan, done: int) -> Iterator[Batch]:
@@ -257,22 +249,6 @@ def trained(checkpoint: Path) -> ShapeNet:
     net = ShapeNet()
     net.load_state_dict(torch.load(checkpoint, map_location="cpu", weights_only=True)["mean"])
     return net.eval()
-
-
-def blended(net: ShapeNet, start: dict[str, Tensor], share: float) -> ShapeNet:
-    """Mix `share` of a network that went on from the weights `start` with them.
-
-    What lies between the two has forgotten less of what only the earlier samples show, and has
-    learned most of what the later ones do (Wortsman et al. 2022, Robust fine-tuning of zero-shot
-    models).
-    """
-    mixed = {
-        name: torch.lerp(start[name], value, share) if value.is_floating_point() else value
-        for name, value in net.state_dict().items()
-    }
-    blend = ShapeNet()
-    blend.load_state_dict(mixed)
-    return blend.eval()
 
 
 def figures(checkpoint: Path, net: ShapeNet) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`objectmorpher evaluate truth` and `evaluate ablation` on the command line."""
+"""`objectmorpher evaluate truth` on the command line."""
 
 from __future__ import annotations
 
@@ -7,20 +7,14 @@ import json
 import pytest
 
 from objectmorpher.cli import parser as cli
-from objectmorpher_research.commands.truth import ABLATIONS
-from objectmorpher_research.evaluation.truth import cases, methods
+from objectmorpher_research.evaluation.truth import cases
 
 FEW = {"turn": (0,), "limb": (0,)}  # of the quick set: one that moves as a whole, one that bends
 
 
-def test_the_command_knows_every_ablation():
-    assert set(ABLATIONS) == set(methods.ABLATIONS)
-
-
-@pytest.mark.parametrize("what", [["truth"], ["ablation", "links"]])
-def test_a_folder_of_another_run_is_one_sentence(what, tmp_path, capsys):
+def test_a_folder_of_another_run_is_one_sentence(tmp_path, capsys):
     (tmp_path / "run.json").write_text('{"cases": 1, "seed": 5}')
-    assert cli.main(["evaluate", *what, str(tmp_path), "--quick"]) == 1
+    assert cli.main(["evaluate", "truth", str(tmp_path), "--quick"]) == 1
     told = capsys.readouterr().err
     assert "run of other cases" in told and told.count("\n") == 1
 
@@ -43,5 +37,3 @@ def test_a_few_of_the_quick_set(tmp_path, capsys, monkeypatch):
     assert page.count("src='data:image/jpeg;base64,") > 9 * len(names) and "http" not in page
     lines = (tmp_path / "report.csv").read_text().splitlines()
     assert len(lines) == 1 + len(told["cases"])
-    assert cli.main(["evaluate", "ablation", "harmonise", str(tmp_path), "--quick"]) == 0
-    assert (tmp_path / "harmonise.html").exists()

@@ -24,7 +24,6 @@ from objectmorpher_research.evaluation.truth import spread_photos
 from objectmorpher_research.evaluation.truth.running import claim
 
 PHOTOS = (0, 1)  # of three edits in all
-ABLATION = "harmonise"
 
 
 def main(folder: Path) -> None:
@@ -44,7 +43,7 @@ def main(folder: Path) -> None:
     ])  # fmt: skip
     killed = [killing.stopped()]
     claim(truth, 0)
-    asked = {"folder": str(truth), "ablation": ABLATION, "seed": 0, "quick": True}
+    asked = {"folder": str(truth), "seed": 0, "quick": True}
     killing = Killing(truth, "cases/*/*.json")
     jobs = [asked | {"photo": k} for k in PHOTOS]
     photos = [answer["name"] for answer in spread(spread_photos._photo, jobs, address)]

@@ -172,15 +172,6 @@ def test_training_goes_on_from_exported_weights(tmp_path):
         weights_of(path, other)
 
 
-def test_what_lies_between_two_networks_has_their_weights_mixed():
-    torch.manual_seed(0)
-    first, second = ShapeNet(), ShapeNet()
-    found = train_shape.blended(second, first.state_dict(), 0.25).state_dict()
-    for name, value in second.state_dict().items():
-        expected = 0.75 * first.state_dict()[name] + 0.25 * value
-        assert torch.allclose(found[name].to(expected.dtype), expected, atol=1e-6), name
-
-
 def test_a_set_of_samples_has_the_families_asked_for(tmp_path, networks, monkeypatch):
     monkeypatch.setattr(shape_data, "SHARD", 2)
     shape_data.write_shards(tmp_path, 2_000_000, 2, families=("prints",))
@@ -212,10 +203,10 @@ def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, ca
         assert 0 < told["means"][way]["front"] < 2
     shipped = Path(registry.__file__).parent / "shape.onnx"
     going_on = [*words, "--start", str(shipped), "--samples", "16", "--passes", "1",
-                "--also", "3:16", "--blend", "0.5", "-o", str(tmp_path / "next.onnx")]  # fmt: skip
+                "--also", "3:16", "-o", str(tmp_path / "next.onnx")]  # fmt: skip
     assert main(going_on) == 0
     told = json.loads((tmp_path / "next.json").read_text(encoding="utf-8"))
-    assert told["steps"] == 2 and told["blend"] == 0.5
+    assert told["steps"] == 2
     assert told["plan"]["also"] == [{"seed": 3, "samples": 16, "families": []}]
     assert (tmp_path / "next.onnx").read_bytes() != weights
     capsys.readouterr()
@@ -223,7 +214,6 @@ def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, ca
         (["--also", "some"], "write SEED:N"),
         (["--also", "1:32:unicorns"], "no family 'unicorns'"),
         (["--also", "0:32"], "cannot have one seed"),
-        (["--blend", "0.5"], "--start"),
     ):
         assert main([*words, "--samples", "16", *wrong]) == 1
         assert reason in capsys.readouterr().err

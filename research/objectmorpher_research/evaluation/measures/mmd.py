@@ -41,14 +41,6 @@ def unbiased_mmd2(x: F64, y: F64) -> float:
     return within_x + within_y - 2 * float(polynomial_kernel(x, y).mean())
 
 
-def paired_mmd2(x: F64, y: F64) -> float:
-    """Gretton eq. 4 of pairs (n, d) and (n, d): unbiased although x_i and y_i belong together.
-
-    Exactly zero for equal sets.
-    """
-    return float(_mean_off_diagonal(_paired_terms(x, y)))
-
-
 def kid(x: F64, y: F64, subsets: Subsets) -> Estimate:
     """The mean of `unbiased_mmd2` over random subsets, and the middle 95 % of theirs.
 
@@ -70,9 +62,10 @@ def kid(x: F64, y: F64, subsets: Subsets) -> Estimate:
 
 
 def paired_kid(x: F64, y: F64) -> Estimate:
-    """`paired_mmd2` with the jackknife's interval.
+    """Gretton eq. 4 of pairs (n, d) and (n, d): unbiased although x_i and y_i belong together.
 
-    Not the bootstrap's: a pair that is drawn twice is alike to itself, which biases the estimate.
+    Exactly zero for equal sets. The interval is the jackknife's: in the bootstrap a pair that is
+    drawn twice is alike to itself, which biases the estimate.
     """
     terms = _paired_terms(x, y)
     n = len(terms)

@@ -57,6 +57,15 @@ class TruthCase:
     has_outside: bool = True  # whether the truth says what is outside the region
 
 
+@dataclass(frozen=True, eq=False)
+class EditOutcome:
+    """A method's result for a case, and where the thing is in it."""
+
+    pixels: RGB  # (H, W, 3)
+    alpha: F64  # (H, W) the thing's coverage
+    reached: F64  # (n, 2) px at which the guidance's points are now
+
+
 @dataclass(frozen=True)
 class PlannedCase:
     """A case that can be made."""

@@ -25,7 +25,6 @@ from objectmorpher_core.document.model import (
     Matte,
     Placement,
     Plate,
-    Pose,
     Prompt,
 )
 from objectmorpher_core.document.settings import DeformSettings, Shadow
@@ -34,8 +33,7 @@ from objectmorpher_core.pipeline import lift_mask, open_photo
 from objectmorpher_core.scripting.options import EditScript
 from objectmorpher_core.scripting.runner import with_plate
 
-from .cases import TruthCase, TruthGuidance
-from .outcome import EditOutcome
+from .cases import EditOutcome, TruthCase, TruthGuidance
 
 OWN, CARD, PLAIN = "own", "card", "plain"  # what is lifted
 LIFTS = {
@@ -56,10 +54,7 @@ class Way:
     lift: str = OWN
     deform: str = "arap"
     links: str = "geodesic"
-    iterations: int | None = None  # plain ones from rest; None: until nothing moves
     is_harmonised: bool = True
-    is_faithful: bool = False
-    knows_camera: bool = True  # else it takes the usual field of view
 
 
 class Chain:
@@ -68,37 +63,32 @@ class Chain:
     def __init__(self, photo: RGB, mask: Mask, camera: Camera, seed: int = 0) -> None:
         self._photo, self._mask, self._camera, self._seed = photo, mask, camera, seed
         self._data = encode_picture(Picture(photo), ".png")
-        self._lifted: dict[tuple[str, bool], tuple[Matte, LiftedObject]] = {}
-        self._puppets: dict[tuple[object, ...], Puppet] = {}
+        self._lifted: dict[str, tuple[Matte, LiftedObject]] = {}
+        self._puppets: dict[tuple[str, ...], Puppet] = {}
         self._plates: dict[bool, tuple[Plate, Shadow]] = {}
 
     def document(self, way: Way = Way()) -> Document:
         """The photo with its object lifted."""
-        fov = None
-        if way.knows_camera:
-            fov = float(np.degrees(2 * np.arctan(0.5 * self._camera.width / self._camera.focal)))
+        fov = float(np.degrees(2 * np.arctan(0.5 * self._camera.width / self._camera.focal)))
         document = open_photo(self._data, "photo.png", fov, self._seed)
         document = edits.set_mask(edits.add_object(document), 0, self._mask, Prompt())
         matte, lifted = self.lift(way)
         document = edits.set_lifted(document, 0, matte, lifted, LIFTS[way.lift])
-        return edits.set_deform(document, 0, _settings(way))
+        return edits.set_deform(document, 0, DeformSettings(mode=way.deform, links=way.links))
 
     def lift(self, way: Way = Way()) -> tuple[Matte, LiftedObject]:
         """The cut-out, and the object in 3D."""
-        key = (way.lift, way.knows_camera)
-        if key not in self._lifted:
-            height, width = self._mask.shape
-            camera = self._camera if way.knows_camera else Camera.from_fov(width, height)
+        if way.lift not in self._lifted:
             matte, lifted = lift_mask(
-                self._photo, camera, self._mask, settings=LIFTS[way.lift], seed=self._seed
+                self._photo, self._camera, self._mask, settings=LIFTS[way.lift], seed=self._seed
             )
             if way.lift == PLAIN:
                 lifted = unpainted(lifted)
-            self._lifted[key] = matte, lifted
-        return self._lifted[key]
+            self._lifted[way.lift] = matte, lifted
+        return self._lifted[way.lift]
 
     def puppet(self, document: Document, way: Way) -> Puppet:
-        key = (way.lift, way.knows_camera, way.deform, way.links, way.is_faithful)
+        key = (way.lift, way.deform, way.links)
         if key not in self._puppets:
             item = document.objects[0]
             assert item.lifted is not None
@@ -110,7 +100,7 @@ class Chain:
         document = self.document(way)
         puppet = self.puppet(document, way)
         points = _picked(puppet, document, case.guidance)
-        document = self._steered(document, puppet, points, case.guidance, way)
+        document = self._steered(document, puppet, points, case.guidance)
         plate, shadow = self._plate(document)
         document = edits.set_shadow(edits.set_plate(document, plate), 0, shadow)
         return edits.harmonised(document, 0, way.is_harmonised), puppet, points
@@ -147,7 +137,7 @@ class Chain:
         return self._plates[leaves]
 
     def _steered(
-        self, document: Document, puppet: Puppet, points: F64, guidance: TruthGuidance, way: Way
+        self, document: Document, puppet: Puppet, points: F64, guidance: TruthGuidance
     ) -> Document:
         if guidance.rigid is not None:
             return edits.set_placement(document, 0, _placed(puppet, points, guidance))
@@ -161,18 +151,8 @@ class Chain:
                 )
             except edits.EditError:  # it has the control point of one before it
                 continue
-        return edits.set_pose(document, 0, _pose(puppet, document, way))
-
-
-def _pose(puppet: Puppet, document: Document, way: Way) -> Pose:
-    item, deformer = document.objects[0], puppet.deformer
-    if way.iterations is not None:
-        return deformer.iterated(item.handles, way.iterations, item.footing)
-    return deformer.solve(item.handles, item.footing).pose
-
-
-def _settings(way: Way) -> DeformSettings:
-    return DeformSettings(mode=way.deform, links=way.links, is_faithful=way.is_faithful)
+        item = document.objects[0]
+        return edits.set_pose(document, 0, puppet.deformer.solve(item.handles, item.footing).pose)
 
 
 def _picked(puppet: Puppet, document: Document, guidance: TruthGuidance) -> F64:

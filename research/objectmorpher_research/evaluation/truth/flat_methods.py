@@ -16,9 +16,8 @@ from scipy.sparse.linalg import splu
 from objectmorpher_core.base.arrays import F64, I32, RGB, crop
 from objectmorpher_core.document.model import Matte
 
-from .cases import TruthCase, TruthGuidance
+from .cases import EditOutcome, TruthCase, TruthGuidance
 from .layer import TexturedMesh, draw_sheet
-from .outcome import EditOutcome
 
 CELLS = 32  # of the warp's grid along the cut-out's longer side
 LEAST_CELL = 4.0  # px

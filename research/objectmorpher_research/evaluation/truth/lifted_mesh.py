@@ -21,10 +21,9 @@ from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 
-from .cases import TruthCase
+from .cases import EditOutcome, TruthCase
 from .chain import LIFTS, OWN, Chain
 from .layer import CutOut, TexturedMesh, draw_sheet
-from .outcome import EditOutcome
 
 STEP = 3.0  # px between the front's vertices
 FINE = 4  # x, that the outline is magnified to be found between pixels

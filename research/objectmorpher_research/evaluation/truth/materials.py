@@ -17,7 +17,6 @@ from objectmorpher_core.base.arrays import F32, F64, RGB
 from ...photos import photo
 from .lookup import looked_up, triplanar
 
-BACKGROUNDS = ("coffee", "china", "astronaut", "flower", "chelsea", "rocket")
 SURFACES = ("retina", "coins", "camera", "moon", "page", "text", "clock", "flower")
 GAMMA = 2.2
 

@@ -1,4 +1,4 @@
-"""The methods that are compared, and the ablations: each differs in what its name says."""
+"""The methods that are compared: each differs in what its name says."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from objectmorpher_core.base.arrays import RGB
 from objectmorpher_core.document.model import Matte
 
 from . import flat_methods
-from .cases import TruthCase
+from .cases import EditOutcome, TruthCase
 from .chain import CARD, PLAIN, Chain, Way
 from .lifted_mesh import draw_mesh
-from .outcome import EditOutcome
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +41,8 @@ def _chain(name: str, told: str, way: Way, only_bends: bool = False) -> EditMeth
     return EditMethod(name, told, lambda given: given.chain.apply(given.case, way), only_bends)
 
 
-def _by_name(*methods: EditMethod) -> Mapping[str, EditMethod]:
-    return {method.name: method for method in methods}
-
-
-_OURS = _chain(OURS, "the product: lifted, deformed by ARAP, harmonised", Way())
-_UNHARMONISED = _chain("no-harmonise", "without harmonise", Way(is_harmonised=False))
-_MESH = EditMethod(
-    "mesh", "a textured mesh of the lifted body instead of Gaussians",
-    lambda given: draw_mesh(given.chain, given.case, given.matte, given.plate),
-)  # fmt: skip
-_LAPLACIAN = _chain("laplacian", "Laplacian instead of ARAP", Way(deform="laplacian"), True)
-_EUCLIDEAN = _chain("euclidean", "Euclidean links", Way(links="euclidean"), True)
-
-METHODS = _by_name(
-    _OURS,
+_ALL = (
+    _chain(OURS, "the product: lifted, deformed by ARAP, harmonised", Way()),
     EditMethod("nothing", "the photo as it is", lambda given: flat_methods.do_nothing(given.case)),
     EditMethod(
         "paste", "best 2-D similarity of the cut-out",
@@ -68,28 +54,12 @@ METHODS = _by_name(
     ),
     _chain("card", "a flat card in 3D", Way(lift=CARD)),
     _chain("plain", "plain-colour Gaussians, four times as many", Way(lift=PLAIN)),
-    _MESH,
-    _LAPLACIAN,
-    _EUCLIDEAN,
-    _UNHARMONISED,
+    EditMethod(
+        "mesh", "a textured mesh of the lifted body instead of Gaussians",
+        lambda given: draw_mesh(given.chain, given.case, given.matte, given.plate),
+    ),
+    _chain("laplacian", "Laplacian instead of ARAP", Way(deform="laplacian"), True),
+    _chain("euclidean", "Euclidean links", Way(links="euclidean"), True),
+    _chain("no-harmonise", "without harmonise", Way(is_harmonised=False)),
 )  # fmt: skip
-
-STEPS = (1, 2, 4, 8, 16, 64)
-ABLATIONS: Mapping[str, Mapping[str, EditMethod]] = {
-    "mesh": _by_name(_OURS, _MESH),
-    "harmonise": _by_name(_OURS, _UNHARMONISED),
-    "links": _by_name(_OURS, _EUCLIDEAN),
-    "deform": _by_name(
-        _OURS, _LAPLACIAN,
-        _chain("faithful", "ARAP as the paper prints it", Way(is_faithful=True), True),
-    ),
-    "iterations": _by_name(
-        _OURS,
-        *(_chain(f"{n}-iterations", f"{n} plain iterations from rest", Way(iterations=n), True)
-          for n in STEPS),
-    ),
-    "camera": _by_name(
-        _OURS,
-        _chain("usual-camera", "50 degrees of view, whatever it was", Way(knows_camera=False)),
-    ),
-}  # fmt: skip
+METHODS: Mapping[str, EditMethod] = {method.name: method for method in _ALL}

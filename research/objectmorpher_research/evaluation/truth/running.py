@@ -22,11 +22,10 @@ from objectmorpher_core.pictures.image import Picture, encode_mask, encode_pictu
 
 from ..error import EvaluationError
 from ..measures import dino
-from .cases import PlannedCase, TruthCase, make_case, wanted_cases
+from .cases import EditOutcome, PlannedCase, TruthCase, make_case, wanted_cases
 from .chain import Chain
 from .methods import OURS, EditMethod, Given
 from .motions import RIGID
-from .outcome import EditOutcome
 from .scores import TruthScore, score
 from .stereo import NAME as STEREO
 from .stereo import stereo_case

@@ -12,8 +12,7 @@ from objectmorpher_core.base.masks import box_of
 
 from ..measures.dino import Dino
 from ..measures.fidelity import psnr, ssim
-from .cases import TruthCase
-from .outcome import EditOutcome
+from .cases import EditOutcome, TruthCase
 
 CONTEXT = 14  # px around the region that measures may look at: a patch of DINOv2's
 PSNR_CAP = 60.0  # dB, of what is equal to the last bit, so that means exist

@@ -46,7 +46,7 @@ class Setting:
     solid: str
     material: SolidMaterial
     side: tuple[float, float, float]  # degrees: yaw, pitch, roll at which it is photographed
-    place: str  # of BACKGROUNDS
+    place: str  # the photo behind it
     lamp: Lamp
     fov: float
     share: float  # of the picture's height that the solid's largest extent fills

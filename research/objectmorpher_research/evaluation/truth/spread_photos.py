@@ -13,19 +13,12 @@ from objectmorpher.server.spread import spread
 from objectmorpher_core.base.progress import Progress
 
 
-def run_photos(
-    folder: Path, ablation: str, seed: int, is_quick: bool, address: str, progress: Progress
-) -> None:
-    """Fills the folder of a run of all methods, or of an ablation's ("" if none), at `address`.
-
-    Raises SpreadError, EvaluationError.
-    """
+def run_photos(folder: Path, seed: int, is_quick: bool, address: str, progress: Progress) -> None:
+    """Fills the folder of a run at `address`. Raises SpreadError, EvaluationError."""
     from .running import claim
 
     claim(folder, seed)
-    asked = {
-        "folder": str(folder.absolute()), "ablation": ablation, "seed": seed, "quick": is_quick
-    }  # fmt: skip
+    asked = {"folder": str(folder.absolute()), "seed": seed, "quick": is_quick}
     left = [k for k, job in enumerate(_jobs(asked)) if not job.is_done]
     jobs = [asked | {"photo": k} for k in left]
     for done, answer in enumerate(spread(_photo, jobs, address), 1):
@@ -33,11 +26,10 @@ def run_photos(
 
 
 def _jobs(asked: dict[str, Any]) -> Any:
-    from .methods import ABLATIONS, METHODS
+    from .methods import METHODS
     from .running import jobs_of
 
-    methods = ABLATIONS[asked["ablation"]] if asked["ablation"] else METHODS
-    return jobs_of(Path(asked["folder"]), methods, asked["seed"], asked["quick"])
+    return jobs_of(Path(asked["folder"]), METHODS, asked["seed"], asked["quick"])
 
 
 def _photo(asked: dict[str, Any]) -> dict[str, Any]:

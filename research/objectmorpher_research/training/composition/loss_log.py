@@ -1,10 +1,8 @@
-"""The losses of every step, a line of JSON each; TensorBoard shows them, too, where it is there."""
+"""The losses of every step, a line of JSON each."""
 
 from __future__ import annotations
 
 import json
-import logging
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +10,7 @@ from objectmorpher_core.base.files import write_all
 
 from . import TrainingError
 
-log = logging.getLogger(__name__)
-FILE, BOARD = "losses.jsonl", "tensorboard"
+FILE = "losses.jsonl"
 
 
 class LossLog:
@@ -23,27 +20,11 @@ class LossLog:
         self._file = folder / FILE
         kept = [row for row in read_losses(folder) if row["step"] < step]
         write_all({self._file: "".join(json.dumps(row) + "\n" for row in kept).encode()})
-        self._board: Any = None
-        if find_spec("tensorboard") is not None:
-            from torch.utils.tensorboard import SummaryWriter
-
-            self._board = SummaryWriter(str(folder / BOARD), purge_step=step)
-        else:
-            log.info("TensorBoard is not installed: the losses are in %s alone", self._file)
 
     def add(self, row: dict[str, Any]) -> None:
         """A step's figures, among them `step`."""
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
-        if self._board is not None:
-            for name in ("loss", "gradient", "checked"):
-                if name in row:
-                    self._board.add_scalar(name, row[name], row["step"])
-
-    def close(self) -> None:
-        """No more is added."""
-        if self._board is not None:
-            self._board.close()
 
 
 def read_losses(folder: Path) -> list[dict[str, Any]]:

@@ -112,8 +112,6 @@ class Trainer:
             if self.step % course.saved == 0 or self.step == course.steps:
                 self.save()
         self.accelerator.wait_for_everyone()
-        if log is not None:
-            log.close()
         return self.save()
 
     def save(self) -> Path:

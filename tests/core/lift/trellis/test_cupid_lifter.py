@@ -16,8 +16,7 @@ from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.registration.placement import Hints, Registrar
 from objectmorpher_core.lift.trellis.camera import view
-from objectmorpher_core.lift.trellis.cupid import CupidGenerator, centres
-from objectmorpher_core.lift.trellis.generator import Folders
+from objectmorpher_core.lift.trellis.generator import CupidGenerator, Folders, centres
 from objectmorpher_core.lift.trellis.latent import looked_up
 from objectmorpher_core.lift.trellis.lifter import FITS, placed, pose_seen
 from objectmorpher_core.lift.trellis.picture import ConditionPicture

@@ -15,9 +15,9 @@ pytest.importorskip("diffusers", reason="TripoSplat needs diffusers")
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_core.lift import LiftError
+from objectmorpher_core.lift.trellis.lifter import TripoSplatLifter
 from objectmorpher_core.lift.triposplat import networks
 from objectmorpher_core.lift.triposplat.generator import DINO, SAMPLING, TripoSplatGenerator
-from objectmorpher_core.lift.triposplat.lifter import TripoSplatLifter
 from objectmorpher_core.models import ModelError
 from objectmorpher_core.models.plans import Plan
 from tests.core.lift.trellis.conftest import one_thread, picture, subject  # noqa: F401

@@ -18,7 +18,7 @@ from objectmorpher_research.evaluation.truth.cases import (
     make_case,
     wanted_cases,
 )
-from objectmorpher_research.evaluation.truth.chain import Chain, Way
+from objectmorpher_research.evaluation.truth.chain import Chain
 from objectmorpher_research.evaluation.truth.methods import METHODS
 from objectmorpher_research.evaluation.truth.motions import PlacedSolid, Rigid, TruthEdit, moved
 from objectmorpher_research.evaluation.truth.rasterise import rasterise
@@ -195,17 +195,6 @@ def test_a_warp_along_a_turn_is_that_turn(still):
     assert np.abs(warped.alpha - pasted.alpha).mean() < 0.002
     apart = np.abs(warped.pixels.astype(float) - pasted.pixels)[pasted.alpha > 0.99]
     assert apart.mean() < 1
-
-
-@pytest.mark.slow
-def test_more_iterations_come_nearer_to_the_settled_pose():
-    case = make_case(CATEGORIES["limb"])
-    chain = Chain(case.photo, case.mask, case.camera)
-    poses = {n: chain.moved(case, Way(iterations=n))[0].objects[0].pose for n in (1, 16, 400, None)}
-    settled = poses[None]
-    assert settled is not None
-    gaps = {n: np.abs(p.points - settled.points).max() for n, p in poses.items() if p is not None}
-    assert gaps[1] > gaps[16] > gaps[400]
 
 
 def _job(folder, crate, *names: str) -> CaseJob:
