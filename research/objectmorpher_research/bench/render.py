@@ -6,11 +6,8 @@ the pose is `bench deform`'s; scenes tell what it took them.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,10 +16,9 @@ from objectmorpher_core.raster.binning import bin_tiles, depth_order
 from objectmorpher_core.raster.projection import project
 from objectmorpher_core.raster.rules import Z
 
+from . import gl
 from .scenes import VIEW, BenchScene, Row, cloud_scene, lift_scene
 from .timing import Effort, Timing, measure
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,7 @@ def bench_render(is_quick: bool) -> tuple[list[Row], str | None]:
     """Return all rows, and the name of the OpenGL renderer."""
     plan = QUICK if is_quick else FULL
     rows: list[Row] = []
-    with drawing() as drawer:
+    with gl.drawing() as drawer:
         count, size = plan.small
         for scene in (cloud_scene(count, size), lift_scene(count, size)):
             rows += [tiles_row(scene, plan.effort), _reference_row(scene)]
@@ -110,59 +106,3 @@ def _reference_row(scene: BenchScene) -> Row:
 
     frame = measure(lambda k: reference.render(scene.splats(k), scene.texture, camera, photo), once)
     return scene.row("reference", frame, measure(sort, once))
-
-
-# The rows of OpenGL: the pass with which the editor draws.
-
-
-class Drawer:
-    """Draws scenes in a context without a window. Rows that cannot be had are left out."""
-
-    def __init__(self, context: Any) -> None:
-        """`context`: a moderngl.Context, or None where there is none."""
-        self._context = context
-        self._pass: Any = None
-        self.name = None if context is None else str(context.info["GL_RENDERER"])
-
-    def rows(self, scene: BenchScene, effort: Effort) -> list[Row]:
-        """The scene's row, if any."""
-        if self._context is None:
-            return []
-        try:
-            return [self._row(scene, effort)]
-        except Exception as error:  # a driver's, of any kind: the other rows still count
-            log.warning("No gl row of the %s: %s", scene.name, error)
-            return []
-
-    def _row(self, scene: BenchScene, effort: Effort) -> Row:
-        if self._pass is None:
-            from objectmorpher.render.splat_pass import SplatPass
-
-            self._pass = SplatPass(self._context)
-        splat_pass, photo = self._pass, scene.puppet.camera
-        depths = scene.splats(0).means[:, 2]
-
-        def frame(k: int) -> None:
-            splat_pass.draw(scene.splats(k), scene.texture, scene.camera, photo)
-            self._context.finish()
-
-        sort = measure(lambda _: depth_order(depths), effort)
-        return scene.row("gl", measure(frame, effort), sort if scene.name == "cloud" else None)
-
-
-@contextmanager
-def drawing() -> Iterator[Drawer]:
-    """A drawer, with OpenGL where it can be had without a window."""
-    try:
-        import moderngl  # what is measured need not be there
-
-        settings: Any = {"backend": "egl"}  # moderngl's annotation of it is of another type
-        context = moderngl.create_context(standalone=True, **settings)
-    except Exception as error:  # what the loader raises differs from system to system
-        log.warning("OpenGL cannot be had without a window here, its rows are left out: %s", error)
-        context = None
-    try:
-        yield Drawer(context)
-    finally:
-        if context is not None:
-            context.release()

@@ -14,9 +14,10 @@ from objectmorpher.cli import parser as cli
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.reference import Picture3D
-from objectmorpher_research.bench.render import Drawer, tiles_frame
+from objectmorpher_research.bench import gl
+from objectmorpher_research.bench.render import tiles_frame
 from objectmorpher_research.bench.scenes import BenchScene, cloud_scene, lift_scene
-from objectmorpher_research.bench.timing import Effort, seconds
+from objectmorpher_research.bench.timing import seconds
 
 CONTRACT = {"renderer", "gaussians", "width", "height", "sort_ms", "frame_ms"}
 ALWAYS = CONTRACT | {"scene", "frame_least_ms", "first_frame_ms", "solve_ms"}
@@ -57,7 +58,7 @@ def test_a_bench_that_is_not_known_is_refused(capsys: pytest.CaptureFixture[str]
 
 def test_without_opengl_its_rows_are_left_out(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
-        assert Drawer(None).rows(cloud_scene(50, 32), Effort(0.0, 1, 1)) == []
+        assert gl.Drawer(None).rows(cloud_scene(50, 32), gl.Effort(0.0, 1, 1)) == []
     assert not caplog.records, "that there is no OpenGL was told when it was looked for"
 
 
