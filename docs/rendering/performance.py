@@ -104,13 +104,11 @@ FRAMES = """
 ## Frames: `objectmorpher bench render`
 
 *tiles* is the CPU rasteriser, as the window shows its pictures; *gl* the same picture by OpenGL;
-*reference* the specification in plain numpy. The *cloud* is plain Gaussians of
+*reference* the specification in plain numpy. *classic-gl* draws the cloud as public splat viewers
+do: depths sorted on the CPU, quads of three standard deviations, covariances computed at each
+corner; it skins nothing, its frames are of what stands still. The *cloud* is plain Gaussians of
 1 to 3 px on a bumpy ball, the *lift* a photo-textured object that covers half of the view; both
 are dragged by one handle. *First* is the first frame of an object, with all that is done once.
-Drawn as public splat viewers do (depths sorted on the CPU, quads of three standard deviations,
-covariances computed at each corner), by code that has gone since, a cloud of 100,000 that stood
-still took 147 ms at 1024 px, one of 300,000 545 ms, on the machine that made this page in November
-2026, on whose processor OpenGL was emulated: five and seven times as long as *tiles*.
 OpenGL: {gl}.
 
 """

@@ -1,4 +1,4 @@
-"""The rows of OpenGL: the pass with which the editor draws."""
+"""The rows of OpenGL: the editor's own pass, and what public viewers do instead."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from objectmorpher_core.raster.binning import depth_order
 
+from .classic_gl import ClassicViewer
 from .scenes import BenchScene, Row
 from .timing import Effort, measure
 
@@ -25,16 +26,20 @@ class Drawer:
         self.name = None if context is None else str(context.info["GL_RENDERER"])
 
     def rows(self, scene: BenchScene, effort: Effort) -> list[Row]:
-        """The scene's row, if any."""
-        if self._context is None:
-            return []
-        try:
-            return [self._row(scene, effort)]
-        except Exception as error:  # a driver's, of any kind: the other rows still count
-            log.warning("No gl row of the %s: %s", scene.name, error)
-            return []
+        """The scene by each renderer that draws such."""
+        kinds = {"gl": self._own_row}
+        if scene.name == "cloud":  # the peer knows no photo
+            kinds["classic-gl"] = self._classic_row
+        rows = []
+        for name, row in kinds.items() if self._context else ():
+            try:
+                rows.append(row(scene, effort))
+            except Exception as error:  # a driver's, of any kind: the other rows still count
+                log.warning("No %s row of the %s: %s", name, scene.name, error)
+        return rows
 
-    def _row(self, scene: BenchScene, effort: Effort) -> Row:
+    def _own_row(self, scene: BenchScene, effort: Effort) -> Row:
+        """The pass with which the editor draws."""
         if self._pass is None:
             from objectmorpher.render.splat_pass import SplatPass
 
@@ -48,6 +53,18 @@ class Drawer:
 
         sort = measure(lambda _: depth_order(depths), effort)
         return scene.row("gl", measure(frame, effort), sort if scene.name == "cloud" else None)
+
+    def _classic_row(self, scene: BenchScene, effort: Effort) -> Row:
+        viewer = ClassicViewer(self._context, scene.posed_gaussians(), scene.camera)
+
+        def frame(_: int) -> None:
+            viewer.draw()
+            self._context.finish()
+
+        sort = measure(lambda _: viewer.sort(), effort)
+        row = scene.row("classic-gl", measure(frame, effort), sort)
+        viewer.release()
+        return row
 
 
 @contextmanager

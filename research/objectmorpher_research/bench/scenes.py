@@ -57,6 +57,10 @@ class BenchScene:
         """The object in a frame of the drag; nothing of it is computed yet."""
         return self.puppet.posed(self.poses[frame % len(self.poses)], Placement())
 
+    def posed_gaussians(self) -> Gaussians:
+        """Return the Gaussians of the first frame, for renderers that know no skinning."""
+        return self.puppet.posed_gaussians(self.poses[0], Placement())
+
     def row(self, renderer: str, frame: Timing, sort: Timing | None, **parts: Timing) -> Row:
         """A row of the report; `sort` is None where nothing has to be sorted."""
         return {

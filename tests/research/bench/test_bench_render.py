@@ -1,10 +1,10 @@
-"""`objectmorpher bench render`: what it reports, and what its scenes are."""
+"""`objectmorpher bench render`: what it reports, and that its peer is a fair one."""
 
 from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.reference import Picture3D
 from objectmorpher_research.bench import gl
+from objectmorpher_research.bench.classic_gl import ClassicViewer
 from objectmorpher_research.bench.render import tiles_frame
 from objectmorpher_research.bench.scenes import BenchScene, cloud_scene, lift_scene
 from objectmorpher_research.bench.timing import seconds
@@ -22,6 +23,20 @@ from objectmorpher_research.bench.timing import seconds
 CONTRACT = {"renderer", "gaussians", "width", "height", "sort_ms", "frame_ms"}
 ALWAYS = CONTRACT | {"scene", "frame_least_ms", "first_frame_ms", "solve_ms"}
 PARTS = {"project_ms", "bin_ms", "draw_ms"}
+PEERS = {"gl", "classic-gl"}  # each where it runs
+PIXEL = 3 / 255  # mean over the picture: 8 bits a blending, and quads that end at 3 sigma
+
+
+@pytest.fixture
+def context() -> Iterator[object]:
+    """An OpenGL context without a window."""
+    moderngl = pytest.importorskip("moderngl")
+    try:
+        context = moderngl.create_standalone_context(backend="egl")
+    except Exception as error:
+        pytest.skip(f"no OpenGL without a window here: {error}")
+    yield context
+    context.release()
 
 
 def drawn(scene: BenchScene, frame: int = 0) -> Picture3D:
@@ -37,9 +52,9 @@ def test_the_report_has_the_keys_that_the_design_names(tmp_path: Path) -> None:
     assert set(report["machine"]) == {"cpu", "cores", "gl_renderer"}
     rows = report["rows"]
     assert {"tiles", "reference"} <= {row["renderer"] for row in rows}
-    assert {row["renderer"] for row in rows} <= {"tiles", "reference", "gl"}
+    assert {row["renderer"] for row in rows} <= {"tiles", "reference"} | PEERS
     assert {row["scene"] for row in rows} == {"cloud", "lift"}
-    has_gl = any(row["renderer"] == "gl" for row in rows)
+    has_gl = any(row["renderer"] in ("gl", "classic-gl") for row in rows)
     assert report["machine"]["gl_renderer"] or not has_gl
     for row in rows:
         assert set(row) >= ALWAYS | (PARTS if row["renderer"] == "tiles" else set())
@@ -87,12 +102,44 @@ def test_a_lift_covers_half_a_photo() -> None:
     assert 0.45 < alpha.mean() < 0.55
 
 
+def test_the_classic_viewer_draws_the_same_picture(context: object) -> None:
+    """Else it would be no peer."""
+    scene = cloud_scene(3000, 256)
+    viewer = ClassicViewer(context, scene.posed_gaussians(), scene.camera)
+    viewer.draw()
+    gpu = np.frombuffer(viewer.picture.read(), np.uint8).reshape(256, 256, 4) / 255
+    viewer.release()
+    cpu = drawn(scene)
+    expected = np.dstack([cpu.color, cpu.alpha])
+    assert expected[..., 3].mean() > 0.05
+    assert np.abs(gpu - expected).mean() < PIXEL / 3
+    assert np.abs(gpu - expected).max() < 8 * PIXEL
+
+
 def least(runs: list[Callable[[], object]], repeats: int) -> list[float]:
     """Least seconds of each, in turns: what else the machine does slows all of them."""
     for run in runs:
         run()
     taken = [[seconds(run) for run in runs] for _ in range(repeats)]
     return np.min(taken, axis=0).tolist()
+
+
+@pytest.mark.slow
+def test_the_tiles_are_three_times_as_fast_as_a_classic_viewer_on_software_opengl(
+    context: object,
+) -> None:
+    info = context.info  # type: ignore[attr-defined]
+    if "llvmpipe" not in info["GL_RENDERER"]:
+        pytest.skip(f"OpenGL is drawn by {info['GL_RENDERER']}")
+    scene = cloud_scene(100_000)
+    viewer = ClassicViewer(context, scene.posed_gaussians(), scene.camera)
+
+    def classic() -> None:
+        viewer.draw()
+        context.finish()  # type: ignore[attr-defined]
+
+    ours, peer = least([lambda: tiles_frame(scene, 0), classic], 25)
+    assert peer >= 3 * ours
 
 
 @pytest.mark.slow
