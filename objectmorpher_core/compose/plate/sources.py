@@ -104,6 +104,7 @@ LEAST_REACH = 8.0  # px
 STRANGE_COST = 2000.0  # squared levels of 255 that a source of a strange colour costs
 SUBJECT_COST = 6000.0  # squared levels of 255 that a source on the subject costs
 MOST_SUBJECT = 0.5  # share of what is around the hole: more, and the hole is amid the subject
+MOST_HOLE = 0.5  # share of a subject that is the hole: of more, it is none
 BINS = 12  # of each channel of CIE Lab
 RARE = 0.002  # share of what is around the hole that a colour must have, or it is none of it
 SMOOTHING = 2.0  # px, over which a source's colour is taken
@@ -121,18 +122,31 @@ def unlikely(rgb: F32, hole: Mask) -> F32:
         return np.zeros(hole.shape, np.float32)
     picture = np.clip(rgb, 0, 255).astype(np.uint8)
     if _network().missing() is None:
-        return np.asarray(SUBJECT_COST * subject(picture, around), np.float32)
+        return np.asarray(SUBJECT_COST * subject(picture, around, hole), np.float32)
     return np.asarray(STRANGE_COST * strange(picture, around), np.float32)
 
 
-def subject(picture: RGB, around: Mask) -> F32:
+def subject(picture: RGB, around: Mask, hole: Mask) -> F32:
     """(h, w) in [0, 1] the subject as U^2-Net-p sees it; nothing where the hole is amid it."""
-    network, nothing = _network(), np.zeros(around.shape, np.float32)
     height, width = around.shape
-    salience = cv2.resize(network.salience(picture), (width, height))
+    salience = cv2.resize(_network().salience(picture), (width, height))
     if salience[around].mean() > MOST_SUBJECT:
-        return nothing
-    return np.clip(np.asarray(salience, np.float32), 0, 1)
+        return np.zeros(around.shape, np.float32)
+    return beside_hole(np.clip(np.asarray(salience, np.float32), 0, 1), hole)
+
+
+def beside_hole(salience: F32, hole: Mask) -> F32:
+    """`salience` (h, w) in [0, 1] without what is mostly a `hole` (h, w).
+
+    A smooth guess in a meadow strikes the network, and with it the grass around.
+    """
+    count, labels = cv2.connectedComponents((salience > 0.5).astype(np.uint8))
+    labels = np.asarray(labels, np.int32)
+    own, whole = (np.bincount(part, minlength=count) for part in (labels[hole], labels.ravel()))
+    is_hole = own > MOST_HOLE * whole
+    is_hole[0] = False
+    near = cv2.dilate(is_hole[labels].astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    return np.where(near, np.float32(0), salience)
 
 
 @cache

@@ -19,6 +19,7 @@ from objectmorpher_core.compose.plate.sources import (
     SUBJECT_COST,
     Guide,
     PatchTone,
+    beside_hole,
     strange,
     unlikely,
 )
@@ -162,6 +163,25 @@ def test_a_face_beside_the_hole_is_unlikelier_than_the_wall(astronaut):
     cost = unlikely(small, hole)
     face, wall = cost[45:70, 100:122].mean(), cost[20:60, 155:165].mean()
     assert face > wall + 0.3 * SUBJECT_COST
+
+
+@needs_network
+def test_a_meadow_is_likely_behind_a_hole_in_it():
+    grass = np.repeat(skimage.data.grass()[:256, :256, None], 3, 2).astype(np.float32)
+    y, x = np.mgrid[:256, :256]
+    hole = np.hypot(x - 128, 0.8 * (y - 128)) < 60
+    cost = unlikely(smooth(grass, (~hole).astype(np.float32)), hole)
+    around = cv2.dilate(hole.astype(np.uint8), np.ones((17, 17))) > 0
+    assert cost[around & ~hole].mean() < 0.05 * SUBJECT_COST
+
+
+def test_the_smooth_guess_in_a_hole_is_no_subject():
+    blob = np.exp(-0.5 * (np.hypot(X - 80, Y - 80) / 26) ** 2).astype(np.float32)  # over its edge
+    beside = np.exp(-0.5 * (np.hypot(X - 20, Y - 30) / 8) ** 2).astype(np.float32)
+    left = beside_hole(np.maximum(blob, beside), HOLE)
+    assert np.array_equal(left[beside > 0.5], beside[beside > 0.5])
+    assert left[blob > 0.5].max() == 0
+    assert np.array_equal(beside_hole(blob, HOLE & (X > 100)), blob), "the hole is a part of it"
 
 
 def test_votes_are_the_mean_of_what_the_patches_say():
