@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from editor_steps import close_all, wait_for_jobs, wait_until
-from objectmorpher.commands import run
+from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.exporting import COPY
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.brush_tools import ComposeTool
 from objectmorpher_core.base.brush import Brush
@@ -83,6 +84,44 @@ def test_what_is_pasted_is_what_was_copied_and_one_undo_takes_it_back(
     pasted.redo()
     assert pasted.document is not None and len(pasted.document.objects) == 1
     assert source(pasted).objects[0] is own, "its own photo is as it was"
+
+
+def test_it_goes_back_to_where_it_came_in(pasted: Editor) -> None:
+    """Not to the place that it has in its own photo; also from a session."""
+    start = pasted.placing.placement
+    assert start is not None and pasted.document is not None
+    pasted.start(decode_session(encode_session(pasted.document)))
+    assert why_not(pasted, "reset_place") == "The object is where it came into this photo"
+    pasted.placing.move_to(Placement((40.0, -9.0), 0.3, (70.0, 0.0, 5.0), 0.5))
+    pasted.commit("Move")
+    run(pasted, "reset_position")
+    assert pasted.placing.placement == replace(start, turn=(70.0, 0.0, 5.0), scale=0.5)
+    run(pasted, "reset_place")
+    assert pasted.placing.placement == start
+
+
+def test_paste_brings_in_what_was_copied_last(
+    editor: Editor, ball: Document, meadow: Document, display: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An object into the photo, also while its picture is still made; else a photo into a tab."""
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    editor.tabs.open(ball)
+    run(editor, "copy_object")
+    editor.tabs.open(meadow)
+    for count in (1, 2):
+        run(editor, "paste")
+        wait_until(editor, lambda n=count: len(editor.opened.objects) == n)
+        wait_for_jobs(editor)
+    assert editor.opened.objects[1].is_visitor and len(editor.tabs.all) == 2
+    run(editor, "copy")
+    wait_for_jobs(editor)
+    wait_until(editor, lambda: not editor.chores.is_busy(COPY))
+    run(editor, "paste")
+    wait_until(editor, lambda: len(editor.tabs.all) == 3)
+    assert editor.opened.photo.size == SIZE and not editor.opened.objects
+    close_all(editor)
+    wait_for_jobs(editor)
 
 
 def test_the_photo_around_it_stays_and_no_hole_is_left(pasted: Editor, meadow: Document) -> None:
