@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from editor_steps import close_all, wait_for_jobs, wait_until
+from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.exporting import COPY
@@ -30,6 +31,7 @@ from objectmorpher_core.session.file import decode_session, encode_session
 from objectmorpher_core.session.journal import Journal, read_journal
 from strokes import stroke
 from test_editor import canvas_xy, drag
+from test_layers import on_canvas
 
 SHARED = ("gaussians", "control_points", "world_from_object", "sides", "texture")
 SIZE = (300, 200)  # px of the other photo, whose camera sees less at a time
@@ -179,6 +181,20 @@ def test_tiles_and_reference_draw_it_alike(pasted: Editor) -> None:
     # One sample may lie beyond a layer's limit by rounding: see PIXEL in test_tiles.py.
     assert (apart > 2e-3).sum() <= 1 and apart.max() <= 2 / 255 and apart.mean() <= 1e-6
     assert (one.from_photo > 0.9).sum() > 100, "it shows its photo"
+
+
+def test_a_draft_of_it_is_nearly_the_exact_picture(pasted: Editor) -> None:
+    """What a slow frame shows looks the photo up that the object carries, not this one."""
+    document, pictures = pasted.committed, []
+    assert document is not None
+    for seconds in (1e-4, np.inf):
+        cache = Cache()
+        cache.frame_time = seconds
+        (layer,) = build_frame(document, pasted.view, cache).layers
+        assert layer.is_draft == (seconds < 1)
+        pictures.append(on_canvas(layer, pasted.view))
+    apart = np.abs(pictures[0] - pictures[1])[pictures[1].any(-1)]
+    assert apart.mean() < 0.02
 
 
 def test_a_session_keeps_it_to_the_last_byte(pasted: Editor, tmp_path: Path) -> None:
