@@ -203,6 +203,23 @@ def test_what_has_no_place_among_others_cannot_be_dragged(editor: Editor, ball: 
     assert editor.document is ball
 
 
+def test_a_selection_that_holds_another_object_says_so(editor: Editor, ball: Document) -> None:
+    """Else one lifts the same thing twice, and only sees it when one of both is moved."""
+    editor.start(ball)
+    mask = ball.objects[0].mask
+    assert mask is not None
+    y, x = np.nonzero(mask)
+    low, high = np.array([x.min(), y.min()]) - 3.0, np.array([x.max(), y.max()]) + 3.0
+    around = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    for share, is_said in ((1.0, True), (0.3, False)):
+        editor.objects.start_another()
+        editor.selection.set_outline(low + share * (around - low))
+        assert editor.mask is not None and not editor.is_lifted
+        said = editor.message is not None and "Object 1 is in" in editor.message.text
+        assert said == is_said
+        editor.undo()
+
+
 def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
     copied.objects.toggle_visible(0)
     assert copied.current == 1 and copied.history is not None
