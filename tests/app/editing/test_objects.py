@@ -16,6 +16,7 @@ from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
+from objectmorpher.gui.panels.select import share_text
 from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.select_tool import SelectTool
@@ -218,6 +219,12 @@ def test_a_selection_that_holds_another_object_says_so(editor: Editor, ball: Doc
         said = editor.message is not None and "Object 1 is in" in editor.message.text
         assert said == is_said
         editor.undo()
+
+
+def test_a_small_selection_is_not_said_to_be_nothing() -> None:
+    assert [share_text(v) for v in (0.0, 1e-6, 4.9e-4, 5e-4, 0.282)] == [
+        "0.0 %", "< 0.1 %", "< 0.1 %", "0.1 %", "28.2 %",
+    ]  # fmt: skip
 
 
 def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
