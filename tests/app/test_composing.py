@@ -292,7 +292,7 @@ def test_a_shadow_that_would_stay_behind_is_offered_once_what_threw_it_is_moved(
         editor.undo()
         wait_for_jobs(editor)
         editor.poll()
-    editor.apply("Move", edits.set_placement(editor.document, 0, moved))
+    editor.apply("Move", edits.set_placement(editor.opened, 0, moved))
     wait_until(editor, lambda: editor.old_shadows.offer is not None)
 
 

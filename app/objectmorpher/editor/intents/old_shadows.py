@@ -194,7 +194,9 @@ class OldShadows:
     def _may_leave_one(self, item: EditObject, document: Document) -> bool:
         from objectmorpher_core.scripting.runner import has_left
 
-        if item.is_visitor or not item.is_visible or item.shadow.strength > 0:
+        if item.matte is None or item.is_visitor or not item.is_visible:
+            return False
+        if item.shadow.strength > 0:
             return False
         if not has_left(item, document):  # it is back: what is moved then is a new move
             self._looked_for.discard(item.matte)
