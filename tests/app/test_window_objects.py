@@ -121,3 +121,23 @@ def test_a_locked_object_has_no_frame_to_take_hold_of(
         hands.drag(hands.on_photo(*FIRST, size), hands.on_photo(*TO, size))
         hands.area("Ring: yaw")  # of the other one
         assert "Object 1 copy is locked" not in hands.places()
+
+
+def test_a_hidden_object_is_not_moved_unseen(
+    without_networks: dict[str, str], ball: Document, tmp_path: Path
+) -> None:
+    session, size = tmp_path / "balls.omorph", (WIDTH, HEIGHT)
+    two = edits.set_placement(edits.duplicate(ball, 0), 1, Placement(move=(50.0, 0.0)))
+    save_session(edits.set_visible(two, 1, False), session)
+    with opened(without_networks, session) as hands:
+        hands.choose("row of Object 1 copy")
+        hands.press("4")
+        hands.catch_up()
+        assert "Ring: yaw" not in hands.places()
+        there = hands.on_photo(CENTRE[0] + 60.0, CENTRE[1], size)
+        hands.drag(there, hands.on_photo(CENTRE[0] + 70.0, CENTRE[1] - 20.0, size))
+        hands.area("Show object")
+        hands.settle()
+        assert "edited" not in hands.title()
+        hands.choose("Show object")
+        hands.area("Ring: yaw")

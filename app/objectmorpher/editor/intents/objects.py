@@ -96,6 +96,12 @@ class Objects:
             label = t("Show object") if is_visible else t("Hide object")
             editor.apply(label, edits.set_visible(editor.document, k, is_visible))
 
+    def say_hidden(self, k: int) -> None:
+        """That object `k` is hidden, with a button that shows it."""
+        name = self._editor.opened.objects[k].name
+        action = Action(t("Show object"), lambda: self.toggle_visible(k))
+        self._editor.say(t("{name} is hidden", name=name), action)
+
     def forget_lost(self) -> None:
         """After a step back: another object is current where the current one is not there."""
         editor = self._editor
@@ -161,8 +167,8 @@ class Objects:
         for k in reversed(order):
             if document.objects[k].lifted is None:  # it stays in front, and is nobody's to drag
                 continue
-            is_free = document.objects[k].is_visible and not document.objects[k].is_locked
-            is_there = k == editor.current or is_free
+            is_free = k == editor.current or not document.objects[k].is_locked
+            is_there = is_free and document.objects[k].is_visible
             if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
                 return None if k == editor.current or self._is_over_current(k) else k
         return None
