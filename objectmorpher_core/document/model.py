@@ -145,6 +145,7 @@ class Origin:
     photo: str  # file name without folder
     camera: Camera  # in whose frame the object was lifted; it carries that photo, by those px
     light: tuple[float, float, float] | None = None  # linear RGB around it; None: not known
+    home: Placement | None = None  # where it came into this one; None: not known
 
 
 GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape

@@ -61,7 +61,8 @@ def arrived(
     ground = ground_for(document, visitor) if lifted.stands or visitor.is_grounded else None
     if ground is not None:
         placement = _stood(placement, lifted, camera, posed(placement), ground)
-    return replace(visitor, placement=placement, is_grounded=ground is not None)
+    lifted = replace(lifted, origin=replace(origin, home=placement))
+    return replace(visitor, lifted=lifted, placement=placement, is_grounded=ground is not None)
 
 
 def with_visitor(document: Document, visitor: EditObject) -> Document:

@@ -58,8 +58,8 @@ def test_a_draft_is_replaced_by_the_exact_picture(editor: Editor, moved: Documen
     build_frame(lift_free(moved), editor.view, cache)
     (exact,) = build_frame(moved, editor.view, cache).layers
     # its window begins elsewhere: interpolation between pixels differs by a rounding
-    on_canvas = [_on_canvas(layer, editor.view) for layer in (shown, exact)]
-    np.testing.assert_allclose(*on_canvas, atol=1.5 / 255)
+    both = [on_canvas(layer, editor.view) for layer in (shown, exact)]
+    np.testing.assert_allclose(*both, atol=1.5 / 255)
     cache.frame_time, cache.layers.ask = FRAME, editor.tasks.render_exact
 
 
@@ -78,8 +78,8 @@ def test_a_draft_covers_what_the_exact_picture_covers(editor: Editor, moved: Doc
     cache.frame_time = FRAME
     exact, draft = pictures
     assert draft.is_draft and not exact.is_draft
-    on_canvas = [_on_canvas(layer, editor.view) for layer in (exact, draft)]
-    difference = np.abs(on_canvas[0] - on_canvas[1])[on_canvas[0].any(-1)]
+    both = [on_canvas(layer, editor.view) for layer in (exact, draft)]
+    difference = np.abs(both[0] - both[1])[both[0].any(-1)]
     assert difference.mean() < 0.02  # they differ along the edge only
     wait_for_jobs(editor)
 
@@ -101,7 +101,7 @@ def test_what_a_drag_shows_is_nearly_exact_and_leaves_nothing(
         document = moving.derived.solved(document, 0, pose, **DRAG)
         pose = document.objects[0].pose
         shown = [build_frame(document, view, cache).layers[0] for cache in (moving, resting)]
-        draft, exact = (_on_canvas(layer, view) for layer in shown)
+        draft, exact = (on_canvas(layer, view) for layer in shown)
         assert shown[0].is_draft and not shown[1].is_draft
         misses.append(np.abs(draft - exact).mean())
     assert max(misses) <= MOVING
@@ -112,7 +112,7 @@ def test_what_a_drag_shows_is_nearly_exact_and_leaves_nothing(
     assert np.array_equal(at_rest.pixels, shown[1].pixels)
 
 
-def _on_canvas(layer: CanvasLayer, view: ViewState) -> np.ndarray:
+def on_canvas(layer: CanvasLayer, view: ViewState) -> np.ndarray:
     """(h, w, 4) of the canvas."""
     canvas = np.zeros((view.height, view.width, 4))
     x0, y0, x1, y1 = map(int, layer.box)

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from editor_steps import close_all, wait_for_jobs, wait_until
-from objectmorpher.commands import run
+from objectmorpher.canvas.frame import Cache, build_frame
+from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.exporting import COPY
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.brush_tools import ComposeTool
 from objectmorpher_core.base.brush import Brush
@@ -29,6 +31,7 @@ from objectmorpher_core.session.file import decode_session, encode_session
 from objectmorpher_core.session.journal import Journal, read_journal
 from strokes import stroke
 from test_editor import canvas_xy, drag
+from test_layers import on_canvas
 
 SHARED = ("gaussians", "control_points", "world_from_object", "sides", "texture")
 SIZE = (300, 200)  # px of the other photo, whose camera sees less at a time
@@ -83,6 +86,44 @@ def test_what_is_pasted_is_what_was_copied_and_one_undo_takes_it_back(
     pasted.redo()
     assert pasted.document is not None and len(pasted.document.objects) == 1
     assert source(pasted).objects[0] is own, "its own photo is as it was"
+
+
+def test_it_goes_back_to_where_it_came_in(pasted: Editor) -> None:
+    """Not to the place that it has in its own photo; also from a session."""
+    start = pasted.placing.placement
+    assert start is not None and pasted.document is not None
+    pasted.start(decode_session(encode_session(pasted.document)))
+    assert why_not(pasted, "reset_place") == "The object is where it came into this photo"
+    pasted.placing.move_to(Placement((40.0, -9.0), 0.3, (70.0, 0.0, 5.0), 0.5))
+    pasted.commit("Move")
+    run(pasted, "reset_position")
+    assert pasted.placing.placement == replace(start, turn=(70.0, 0.0, 5.0), scale=0.5)
+    run(pasted, "reset_place")
+    assert pasted.placing.placement == start
+
+
+def test_paste_brings_in_what_was_copied_last(
+    editor: Editor, ball: Document, meadow: Document, display: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An object into the photo, also while its picture is still made; else a photo into a tab."""
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    editor.tabs.open(ball)
+    run(editor, "copy_object")
+    editor.tabs.open(meadow)
+    for count in (1, 2):
+        run(editor, "paste")
+        wait_until(editor, lambda n=count: len(editor.opened.objects) == n)
+        wait_for_jobs(editor)
+    assert editor.opened.objects[1].is_visitor and len(editor.tabs.all) == 2
+    run(editor, "copy")
+    wait_for_jobs(editor)
+    wait_until(editor, lambda: not editor.chores.is_busy(COPY))
+    run(editor, "paste")
+    wait_until(editor, lambda: len(editor.tabs.all) == 3)
+    assert editor.opened.photo.size == SIZE and not editor.opened.objects
+    close_all(editor)
+    wait_for_jobs(editor)
 
 
 def test_the_photo_around_it_stays_and_no_hole_is_left(pasted: Editor, meadow: Document) -> None:
@@ -140,6 +181,20 @@ def test_tiles_and_reference_draw_it_alike(pasted: Editor) -> None:
     # One sample may lie beyond a layer's limit by rounding: see PIXEL in test_tiles.py.
     assert (apart > 2e-3).sum() <= 1 and apart.max() <= 2 / 255 and apart.mean() <= 1e-6
     assert (one.from_photo > 0.9).sum() > 100, "it shows its photo"
+
+
+def test_a_draft_of_it_is_nearly_the_exact_picture(pasted: Editor) -> None:
+    """What a slow frame shows looks the photo up that the object carries, not this one."""
+    document, pictures = pasted.committed, []
+    assert document is not None
+    for seconds in (1e-4, np.inf):
+        cache = Cache()
+        cache.frame_time = seconds
+        (layer,) = build_frame(document, pasted.view, cache).layers
+        assert layer.is_draft == (seconds < 1)
+        pictures.append(on_canvas(layer, pasted.view))
+    apart = np.abs(pictures[0] - pictures[1])[pictures[1].any(-1)]
+    assert apart.mean() < 0.02
 
 
 def test_a_session_keeps_it_to_the_last_byte(pasted: Editor, tmp_path: Path) -> None:

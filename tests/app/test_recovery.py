@@ -47,6 +47,12 @@ def test_every_crashed_editor_is_listed_the_newest_first(editor: Editor) -> None
     leave("cat", 9), leave("dog", 14)
     editor.recovery.look()
     assert [left.name for left in editor.recovery.left] == ["dog.jpg", "cat.jpg"]
+    recover(editor, "dog")  # in whose place no list is: the other is offered there
+    assert editor.message is not None and editor.message.action is not None
+    assert "cat.jpg" in editor.message.text
+    editor.message.action.run()
+    wait_until(editor, lambda: editor.chores.is_idle)
+    assert editor.message is not None and "Recovered cat.jpg" in editor.message.text
 
 
 def test_what_is_recovered_is_unsaved_and_stays_safe(editor: Editor) -> None:

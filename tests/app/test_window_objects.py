@@ -82,6 +82,27 @@ def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
     assert second.placement.move == (50.0, 0.0)
 
 
+def test_a_row_let_go_on_a_tab_is_copied_there_and_a_key_pose_moves_no_button(
+    without_networks: dict[str, str], ball: Document, photo_path: Path, tmp_path: Path
+) -> None:
+    session = tmp_path / "balls.omorph"
+    save_session(ball, session)
+    with opened(without_networks, session, str(photo_path)) as hands:
+        hands.drag(hands.place("row of Object 1"), hands.place("Tab: ball.png"))
+        hands.wait(lambda: "ball.png — edited" in hands.title(), "copying into the tab")
+        hands.settle()
+        assert rows(hands) == ["Object 1"]
+        hands.press("3")
+        hands.xdotool("mousemove", 1300, 600)
+        hands.xdotool("click", "--repeat", 20, 5)
+        hands.settle()
+        before = hands.area("Add key pose")
+        hands.choose("Add key pose")
+        hands.area("Go to key pose 1")
+        hands.settle()
+        assert hands.area("Add key pose") == before
+
+
 def test_a_locked_object_has_no_frame_to_take_hold_of(
     without_networks: dict[str, str], ball: Document, tmp_path: Path
 ) -> None:
@@ -100,3 +121,23 @@ def test_a_locked_object_has_no_frame_to_take_hold_of(
         hands.drag(hands.on_photo(*FIRST, size), hands.on_photo(*TO, size))
         hands.area("Ring: yaw")  # of the other one
         assert "Object 1 copy is locked" not in hands.places()
+
+
+def test_a_hidden_object_is_not_moved_unseen(
+    without_networks: dict[str, str], ball: Document, tmp_path: Path
+) -> None:
+    session, size = tmp_path / "balls.omorph", (WIDTH, HEIGHT)
+    two = edits.set_placement(edits.duplicate(ball, 0), 1, Placement(move=(50.0, 0.0)))
+    save_session(edits.set_visible(two, 1, False), session)
+    with opened(without_networks, session) as hands:
+        hands.choose("row of Object 1 copy")
+        hands.press("4")
+        hands.catch_up()
+        assert "Ring: yaw" not in hands.places()
+        there = hands.on_photo(CENTRE[0] + 60.0, CENTRE[1], size)
+        hands.drag(there, hands.on_photo(CENTRE[0] + 70.0, CENTRE[1] - 20.0, size))
+        hands.area("Show object")
+        hands.settle()
+        assert "edited" not in hands.title()
+        hands.choose("Show object")
+        hands.area("Ring: yaw")

@@ -167,7 +167,7 @@ class Layers:
         else:
             picture = tiles.draw(drawable, texture, box)
             drawn = time.perf_counter()
-            layer = _sharp_layer(picture, texture, part, box, factor, view, painted)
+            layer = _sharp_layer(picture, texture, part, box, factor, view, painted, drawable)
             sharpened = time.perf_counter() - drawn
             self._sharpening = _mean_rate(self._sharpening, sharpened, factor**2 * pixels)
         seconds = time.perf_counter() - start - sharpened
@@ -255,15 +255,21 @@ def _sharp_layer(
     factor: int,
     view: ViewState,
     painted: F32 | None,
+    drawable: Drawable,
 ) -> CanvasLayer:
-    """An object that shows the photo, see `sharpening`; `box` as above, `painted` of it."""
+    """An object that shows the photo, see `sharpening`; `box` as above, `painted` of it.
+
+    It is the photo that the object carries, which may be another one.
+    """
     from objectmorpher_core.raster.sharpening import sharpen
 
     x0, y0, x1, y1 = (factor * v for v in box)
     covered = (x0, y0, min(x1, view.width), min(y1, view.height))
-    corner = (view.left, view.top)
+    coarse, photo = drawable.camera, drawable.photo_camera
+    step = photo.focal / coarse.focal  # photo px per px of the draft
+    corner = (photo.cx - step * coarse.cx, photo.cy - step * coarse.cy)
     rgba, invented = sharpen(
-        picture, texture, factor, covered, corner, view.zoom, is_marked=part.is_marked
+        picture, texture, factor, covered, corner, factor / step, is_marked=part.is_marked
     )
     if painted is not None and invented is not None:
         wide = cv2.resize(painted, None, fx=factor, fy=factor)[: len(rgba), : rgba.shape[1]]

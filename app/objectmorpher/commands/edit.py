@@ -17,7 +17,6 @@ from .command import (
     no_lift,
     no_photo,
     no_redo,
-    no_selection,
     no_undo,
     nothing_lifted,
     unless,
@@ -80,10 +79,24 @@ def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
     return Command(tool.value, keys, lambda editor: editor.choose_tool(tool), why_not, is_on)
 
 
-def _copy_object(editor: Editor) -> None:
-    """Into the system's clipboard as a picture, and for other tabs as it is."""
-    editor.pasting.copy()
-    editor.exporting.copy(What.CUTOUT)
+def _copy(editor: Editor) -> None:
+    """The object into the system's clipboard as a picture, and for other tabs as it is.
+
+    Where none is selected, the photo.
+    """
+    if editor.mask is None:
+        editor.exporting.copy(What.PHOTO)
+    else:
+        editor.pasting.copy()
+        editor.exporting.copy(What.CUTOUT, editor.pasting.offered)
+
+
+def _paste(editor: Editor) -> None:
+    """What was copied last, here or elsewhere: an object into the photo, a photo into a tab."""
+    if editor.document is not None and editor.pasting.has_copied:
+        editor.pasting.paste_newest(editor.filing.paste)
+    else:
+        editor.filing.paste()
 
 
 _nothing_copied = unless(
@@ -94,12 +107,12 @@ _nothing_copied = unless(
 COMMANDS: dict[str, Command] = {
     "undo": Command("Undo", "Ctrl+Z", lambda e: e.undo(), no_undo),
     "redo": Command("Redo", "Ctrl+Shift+Z", lambda e: e.redo(), no_redo, other_keys=("Ctrl+Y",)),
-    "copy": Command("Copy photo", "Ctrl+C", lambda e: e.exporting.copy(What.PHOTO)),
-    "copy_object": Command("Copy object", "Ctrl+Shift+C", _copy_object, no_selection),
+    "copy_object": Command("Copy", "Ctrl+C", _copy),
+    "copy": Command("Copy photo", "Ctrl+Shift+C", lambda e: e.exporting.copy(What.PHOTO)),
     "paste_object": Command(
         "Paste object", "Ctrl+Shift+V", lambda e: e.pasting.paste(), _nothing_copied
     ),
-    "paste": Command("Paste photo", "Ctrl+V", lambda e: e.filing.paste(), never),
+    "paste": Command("Paste", "Ctrl+V", _paste, never),
     "select": _tool(ToolName.SELECT, "1", no_photo),
     "mask": _tool(ToolName.MASK, "2", no_photo),
     "pose": _tool(ToolName.POSE, "3", no_lift),

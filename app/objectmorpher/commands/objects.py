@@ -85,18 +85,26 @@ COMMANDS: dict[str, Command] = {
 
 
 def _where_it_was(editor: Editor) -> str:
+    if editor.object is not None and editor.object.is_visitor:
+        return t("The object is where it came into this photo")
     return t("The object is where it was in the photo")
 
 
-def _reset(is_changed: Callable[[Placement], object], reason: Callable[[Editor], str]) -> Reason:
-    """The reason why what is as it was already cannot be reset."""
-    return unless(lambda e: (p := e.placing.placement) and is_changed(p), reason, no_lift)
+def _reset(part: Callable[[Placement], object], reason: Callable[[Editor], str]) -> Reason:
+    """The reason why a part of the placement that is as it was already cannot be reset."""
+    return unless(
+        lambda e: (p := e.placing.placement) and part(p) != part(e.placing.home), reason, no_lift
+    )
 
 
-_not_moved = _reset(lambda place: not place.is_identity, _where_it_was)
-_not_shifted = _reset(lambda place: any((*place.move, place.depth)), _where_it_was)
-_not_turned = _reset(lambda place: any(place.turn), lambda e: t("The object is not turned"))
-_not_sized = _reset(lambda place: place.scale != 1, lambda e: t("The object has its own size"))
+_not_moved = _reset(lambda place: place, _where_it_was)
+_not_shifted = _reset(lambda place: (*place.move, place.depth), _where_it_was)
+_not_turned = unless(
+    lambda e: (p := e.placing.placement) and any(p.turn),
+    lambda e: t("The object is not turned"),
+    no_lift,
+)
+_not_sized = _reset(lambda place: place.scale, lambda e: t("The object has its own size"))
 
 
 PLACE_COMMANDS: dict[str, Command] = {

@@ -131,6 +131,8 @@ class Recovery:
             editor.autosave.adopt(HeldJournal(Journal(left.folder), lock))
             editor.say(t("Recovered {name} as it was at {time}", name=left.name,
                          time=when(left.edited)))  # fmt: skip
+            self._is_unseen = bool(self.left)  # the start screen is gone, which listed the others
+            self.offer()
 
         def fail(error: JobError) -> None:
             lock.release()

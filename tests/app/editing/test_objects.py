@@ -16,6 +16,7 @@ from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
+from objectmorpher.gui.panels.select import share_text
 from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.select_tool import SelectTool
@@ -201,6 +202,29 @@ def test_what_has_no_place_among_others_cannot_be_dragged(editor: Editor, ball: 
     assert editor.objects.landing(0) is None
     editor.objects.drop(0)
     assert editor.document is ball
+
+
+def test_a_selection_that_holds_another_object_says_so(editor: Editor, ball: Document) -> None:
+    """Else one lifts the same thing twice, and only sees it when one of both is moved."""
+    editor.start(ball)
+    mask = ball.objects[0].mask
+    assert mask is not None
+    y, x = np.nonzero(mask)
+    low, high = np.array([x.min(), y.min()]) - 3.0, np.array([x.max(), y.max()]) + 3.0
+    around = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    for share, is_said in ((1.0, True), (0.3, False)):
+        editor.objects.start_another()
+        editor.selection.set_outline(low + share * (around - low))
+        assert editor.mask is not None and not editor.is_lifted
+        said = editor.message is not None and "Object 1 is in" in editor.message.text
+        assert said == is_said
+        editor.undo()
+
+
+def test_a_small_selection_is_not_said_to_be_nothing() -> None:
+    assert [share_text(v) for v in (0.0, 1e-6, 4.9e-4, 5e-4, 0.282)] == [
+        "0.0 %", "< 0.1 %", "< 0.1 %", "0.1 %", "28.2 %",
+    ]  # fmt: skip
 
 
 def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:

@@ -329,15 +329,21 @@ class Exporting:
             kind=f"{WRITE} {path}",
         )  # fmt: skip
 
-    def copy(self, what: What) -> None:
-        """Put the edited photo, or the current object alone, into the clipboard."""
+    def copy(self, what: What, offered: Callable[[bytes], None] = lambda png: None) -> None:
+        """Put the edited photo, or the current object alone, into the clipboard.
+
+        `offered` is told which PNG file it is.
+        """
         editor, document = self._editor, self._editor.committed
         if document is None:
             return
         plan = ExportPlan(what, Path("copied.png"), editor.current, bits=8)
-        told = t("Copied the object") if what is What.CUTOUT else t("Copied the photo")
+        told = t("Copied the photo")
+        if what is What.CUTOUT:
+            told = t("Copied {name} · Ctrl+Shift+C copies the photo", name=editor.chosen.name)
 
         def offer(png: bytes) -> None:
+            offered(png)
             editor.chores.start(
                 t("Copying"), lambda progress: clipboard.copy(png), kind=COPY,
                 done=lambda _: editor.say(told), failed=editor.complain_of,
@@ -345,8 +351,9 @@ class Exporting:
 
         editor.jobs.start(
             t("Copying"), encode_export, document, plan, done=offer,
-            failed=lambda error: editor.complain_of(error.retried_by(lambda: self.copy(what))),
-            kind=COPY,
+            failed=lambda error: editor.complain_of(
+                error.retried_by(lambda: self.copy(what, offered))
+            ), kind=COPY,
         )  # fmt: skip
 
     # Inside

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document import edits, visitor_edits
 from objectmorpher_core.document.model import Document, EditObject, Photo, Placement
 
 from ...canvas.layer import is_front
 from ...canvas.shape import CanvasShape, build_shape, rehearse
+from ...system import clipboard
 from ...system.texts import t
 from ...worker.requests import LIFT
 from ..tasks import SELECT
@@ -94,6 +96,12 @@ class Objects:
             label = t("Show object") if is_visible else t("Hide object")
             editor.apply(label, edits.set_visible(editor.document, k, is_visible))
 
+    def say_hidden(self, k: int) -> None:
+        """That object `k` is hidden, with a button that shows it."""
+        name = self._editor.opened.objects[k].name
+        action = Action(t("Show object"), lambda: self.toggle_visible(k))
+        self._editor.say(t("{name} is hidden", name=name), action)
+
     def forget_lost(self) -> None:
         """After a step back: another object is current where the current one is not there."""
         editor = self._editor
@@ -159,8 +167,8 @@ class Objects:
         for k in reversed(order):
             if document.objects[k].lifted is None:  # it stays in front, and is nobody's to drag
                 continue
-            is_free = document.objects[k].is_visible and not document.objects[k].is_locked
-            is_there = k == editor.current or is_free
+            is_free = k == editor.current or not document.objects[k].is_locked
+            is_there = is_free and document.objects[k].is_visible
             if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
                 return None if k == editor.current or self._is_over_current(k) else k
         return None
@@ -268,10 +276,10 @@ class Objects:
 
     # A row of the list that is dragged
 
-    def carry(self, k: int) -> bool:
-        """Takes up object `k`'s row; whether it has a place among others."""
+    def carry(self, k: int, has_tabs: bool = False) -> bool:
+        """Takes up object `k`'s row; whether it has a place among others, or in another tab."""
         order = self.order()
-        if k in order and len(order) > 1 and not self._editor.hand.is_busy:
+        if k in order and (len(order) > 1 or has_tabs) and not self._editor.hand.is_busy:
             self.carried = k
         return self.carried is not None
 
@@ -310,6 +318,7 @@ class Pasting:
         self._editor, self._objects, self._tabs = editor, objects, tabs
         self._copied: EditObject | None = None
         self._photo: weakref.ref[Photo] | None = None  # it was copied from
+        self._picture: bytes | None = b""  # PNG of it in the clipboard; None: not there yet
 
     @property
     def has_copied(self) -> bool:
@@ -317,9 +326,10 @@ class Pasting:
         return self._copied is not None
 
     def copy(self) -> None:
-        """Remembers the current object, if it is lifted, as it is now."""
+        """Remembers the current object, if it is lifted, as it is now; else nothing is copied."""
         from objectmorpher_core.compose.light.lighting import Lighting
 
+        self._copied = self._picture = None
         editor, document = self._editor, self._editor.committed
         if document is None or not editor.is_lifted or editor.current >= len(document.objects):
             return
@@ -329,6 +339,22 @@ class Pasting:
         light = Lighting(document).around(puppet.posed(None, Placement()))
         self._copied = visitor_edits.departing(document, k, light)
         self._photo = weakref.ref(document.photo)
+
+    def offered(self, png: bytes) -> None:
+        """This picture of the copied object is for other programs."""
+        self._picture = png
+
+    def paste_newest(self, paste_photo: Callable[[], None]) -> None:
+        """Pastes the copied object, unless something else was copied since: then that."""
+        picture = self._picture
+
+        def is_own(progress: Progress) -> bool:
+            return picture is None or clipboard.holds(picture)
+
+        self._editor.chores.start(
+            t("Pasting"), is_own, kind=PASTE, failed=self._editor.complain_of,
+            done=lambda is_own: self.paste() if is_own else paste_photo(),
+        )  # fmt: skip
 
     def paste(self) -> None:
         """The copied object in the photo that is shown, as one step, when it can be drawn."""
@@ -374,9 +400,13 @@ class Pasting:
         )  # fmt: skip
 
     def carry(self, tab: Tab) -> None:
-        """Copies the current object into another tab, and shows that one."""
+        """Copies the current object, or that of the carried row, into another tab; shows that."""
+        k, self._objects.carried = self._objects.carried, None
+        if k is not None:
+            self._objects.choose(k)
         if tab.document is not None and self._editor.is_lifted:
             self.copy()
+            self._picture = b""
             self._tabs.go(tab, self.paste)
 
     def _return(self, document: Document, copied: EditObject) -> bool:

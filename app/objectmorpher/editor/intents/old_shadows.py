@@ -161,14 +161,14 @@ class OldShadows:
         editor, document, k = self._editor, self._editor.committed, self._editor.current
         if editor.hand.is_busy or editor.preview is not None or not editor.jobs.is_idle:
             return False
-        if document is None or editor.is_saved:
+        if document is None:
             return False
         before, self._watched = self._watched, (document, k)
         if before[0] is document and before[1] == k:
             return False
         if document.plate is None or not editor.is_lifted:
             return False
-        if not self._may_leave_one(document.objects[k], document):
+        if not self._may_leave_one(document.objects[k], document) or editor.is_saved:
             return False
         cutout = replace(self._cutout(document, k), is_asked=False)
         self._looked_for.add(cutout.matte)
@@ -194,9 +194,14 @@ class OldShadows:
     def _may_leave_one(self, item: EditObject, document: Document) -> bool:
         from objectmorpher_core.scripting.runner import has_left
 
-        if item.is_visitor or not item.is_visible or item.shadow.strength > 0:
+        if item.matte is None or item.is_visitor or not item.is_visible:
             return False
-        return item.matte not in self._looked_for and has_left(item, document)
+        if item.shadow.strength > 0:
+            return False
+        if not has_left(item, document):  # it is back: what is moved then is a new move
+            self._looked_for.discard(item.matte)
+            return False
+        return item.matte not in self._looked_for
 
     def _cutout(self, document: Document, k: int) -> Cutout:
         """A lifted object, and what there is to be known of its ground."""

@@ -45,6 +45,13 @@ class Placing:
         editor = self._editor
         return editor.object.placement if editor.is_lifted and editor.object else None
 
+    @property
+    def home(self) -> Placement:
+        """Where the current object was in the photo; one of another photo where it came in."""
+        thing = self._editor.object
+        origin = None if thing is None or thing.lifted is None else thing.lifted.origin
+        return Placement() if origin is None or origin.home is None else origin.home
+
     def frame(self) -> ObjectFrame | None:
         """The object's outline box in the picture."""
         editor = self._editor
@@ -295,19 +302,19 @@ class Placing:
             editor.commit(t("Nudge object"))
 
     def reset(self) -> None:
-        """Back to where it was in the photo."""
-        if self.placement is not None and not self.placement.is_identity:
-            self.move_to(Placement())
+        """Back to where it was in the photo, or where it came into it."""
+        if self.placement is not None and self.placement != self.home:
+            self.move_to(self.home)
             self._editor.commit(t("Back to where it was"))
 
     def reset_position(self) -> None:
-        self._reset(t("Reset position"), move=(0.0, 0.0), depth=0.0)
+        self._reset(t("Reset position"), move=self.home.move, depth=self.home.depth)
 
     def reset_turn(self) -> None:
         self._reset(t("Reset turn"), turn=(0.0, 0.0, 0.0))
 
     def reset_size(self) -> None:
-        self._reset(t("Reset size"), scale=1.0)
+        self._reset(t("Reset size"), scale=self.home.scale)
 
     def _reset(self, label: str, **parts: object) -> None:
         placement = self.placement

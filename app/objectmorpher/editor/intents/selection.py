@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .landing import Landing
     from .masking import Masking
 
+MOST_SHARED = 0.5  # of another object, which is said of a selection that holds more of it
 SAME_PLACE = 5.0  # points: a click this near to the last one asks for more or less around it
 
 
@@ -194,6 +195,23 @@ class Selection:
             editor.complain(str(error))
             return
         self._masking.take(question.label, changed, k)
+        self._say_twin(k)
+
+    def _say_twin(self, k: int) -> None:
+        """Say so where what is not lifted yet, object `k`, holds most of another one."""
+        objects = self._editor.opened.objects
+        own = objects[k] if k < len(objects) else None
+        if own is None or own.mask is None or own.lifted is not None:
+            return
+        for other in objects:
+            if other is own or other.mask is None or not other.mask.any():
+                continue
+            if (own.mask & other.mask).sum() > MOST_SHARED * other.mask.sum():
+                self._editor.say(
+                    t("{name} is in this selection, too · Right-click it to leave it out",
+                      name=other.name)
+                )  # fmt: skip
+                return
 
     # Questions
 

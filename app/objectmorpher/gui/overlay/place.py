@@ -28,14 +28,14 @@ TRUST = {"fine": "#70A020", "look closely": "#E0A030", "guesswork": "#E05040"}
 
 
 def draw_frame(canvas: CanvasPainter) -> None:
-    """Draw the Place tool's frame; a locked object has none."""
+    """Draw the Place tool's frame; a locked or hidden object has none."""
     editor = canvas.editor
     shown = gizmo(editor)
     if shown is None or editor.object is None:
         return
     part = editor.hover.part
     draw_other(canvas)
-    if editor.object.is_locked:
+    if editor.object.is_locked or not editor.object.is_visible:
         return
     draw_offered_shadow(canvas)
     for line in ghost(editor):

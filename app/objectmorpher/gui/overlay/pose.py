@@ -40,12 +40,12 @@ def draw_pose(canvas: CanvasPainter) -> None:
         _draw_influence(canvas, editor.posing.handle)
     if pose.has_regions or not is_dragging:
         draw_regions(canvas)
-    is_free = is_dragging and not thing.is_locked
+    is_free = is_dragging and not thing.is_locked and thing.is_visible
     is_hinting = is_free and not thing.handles and editor.hover.surface is None
     hinting, share = fades.shown("hint points", thing.lifted if is_hinting else None)
     if hinting is thing.lifted:
         _draw_hint_points(canvas, share)
-    if thing.handles:
+    if thing.handles and thing.is_visible:
         _draw_handles(canvas, thing)
     if not is_dragging:
         draw_brush(canvas)

@@ -1,6 +1,6 @@
 """The photo's objects, what is in front first: choose, name, hide, copy, remove, reorder.
 
-A row that is dragged up or down lands where the line is.
+A row that is dragged up or down lands where the line is, on another tab in that photo.
 """
 
 from __future__ import annotations
@@ -149,10 +149,13 @@ def _drag_row(editor: Editor, top: ImVec2) -> None:
     gap = round((imgui.get_mouse_pos().y - top.y) / height)
     if not imgui.is_mouse_down(0):
         _is_dragged = False
-        editor.objects.drop(gap)
+        if (tab := editor.tabs.aimed) is not None:
+            editor.pasting.carry(tab)
+        else:
+            editor.objects.drop(gap)
         return
-    landing = editor.objects.landing(gap)
-    if editor.objects.carried is not None:
+    landing = None if editor.tabs.aimed else editor.objects.landing(gap)
+    if editor.objects.carried is not None and editor.tabs.aimed is None:
         imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ns)
     if landing is not None:
         width = imgui.get_content_region_avail().x
@@ -174,7 +177,7 @@ def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
         editor.objects.choose(k)
     mark(f"row of {editor.opened.objects[k].name}")
     if imgui.is_item_active() and imgui.is_mouse_dragging(0, theme.pt(SLACK)) and not _is_dragged:
-        _is_dragged = editor.objects.carry(k)
+        _is_dragged = editor.objects.carry(k, has_tabs=len(editor.tabs.all) > 1)
     is_hovered = imgui.is_item_hovered()
     if is_hovered and imgui.is_mouse_double_clicked(0):
         editor.objects.renaming = k

@@ -146,7 +146,9 @@ def _draw_seen_from(editor: Editor) -> None:
     usual = editor.placing.usual_seen_from
     number = Number(t("From above"), "%.0f°", 0.25, 1.0, usual, 0.0, 90.0)
     change = number_field(number, editor.placing.seen_from)
-    tooltip(t("How steeply you look down on it: 0° from its side, 90° from above"))
+    hint = t("How steeply you look down on it: 0° from its side, 90° from above")
+    stays = t("It stays as it is; Yaw, Pitch and Roll are counted about its new upright")
+    tooltip(f"{hint}\n{stays}")
     wanted = None if change.value == usual else change.value
     take(editor, change, lambda: editor.placing.look_down(wanted), t("Set what is upright"))
 

@@ -322,18 +322,16 @@ STATION = 26.0  # points, width and height of a key pose
 def draw_timeline(editor: Editor) -> None:
     """Draw the key poses on a line; a click goes to one."""
     heading(t("Animation"))
+    half = half_width()
+    command_button(editor, "add_key", icon=Icon.PLUS)  # above what its clicks add: it stays there
     if editor.keying.count:
         _draw_stations(editor)
+        command_button(editor, "replace_key", t("Replace"), half)
+        tooltip(t("The key pose that you were in last becomes what you see now"))
+        imgui.same_line()
+        command_button(editor, "remove_key", t("Remove"), half)
     if editor.keying.count < 2:
         note(t("Keep two poses or more: a video can show the way from one to the next."))
-    half = half_width()
-    command_button(editor, "add_key", icon=Icon.PLUS)
-    if not editor.keying.count:
-        return
-    command_button(editor, "replace_key", t("Replace"), half)
-    tooltip(t("The key pose that you were in last becomes what you see now"))
-    imgui.same_line()
-    command_button(editor, "remove_key", t("Remove"), half)
 
 
 def _draw_stations(editor: Editor) -> None:

@@ -222,6 +222,11 @@ def _levels() -> tuple[Segment[str], ...]:
     )
 
 
+def share_text(share: float) -> str:
+    """A share of the photo, in [0, 1]; that of a small thing is not nothing."""
+    return f"{100 * share:.1f} %" if not 0 < share < 0.0005 else "< 0.1 %"
+
+
 def _draw_facts(editor: Editor) -> None:
     """How much is selected, by what, and what to do next."""
     prompt, mask = editor.selection.prompt, editor.mask
@@ -229,8 +234,9 @@ def _draw_facts(editor: Editor) -> None:
     removes = len(prompt.clicks) - adds
     facts = []
     if mask is not None:
-        share = f"{100 * editor.selection.share:.1f} %"
-        facts.append(t("{share} of the photo is selected.", share=share))
+        facts.append(
+            t("{share} of the photo is selected.", share=share_text(editor.selection.share))
+        )
     if removes or adds > 1:
         facts.append(t("Clicks: {adds} added, {removes} removed.", adds=adds, removes=removes))
     if editor.object is not None and editor.object.found is not None:

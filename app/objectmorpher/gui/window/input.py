@@ -459,18 +459,22 @@ class Input:
 
 
 def _is_locked(editor: Editor, pointer: Pointer) -> bool:
-    """Whether a press would change the current object, which is locked; that is said."""
+    """Whether a press would change the current object, which is locked or hidden; that is said."""
     if not _is_held(editor) or editor.objects.other_at(pointer.xy) is not None:
         return False
-    editor.say_locked(editor.current)
+    if editor.chosen.is_locked:
+        editor.say_locked(editor.current)
+    else:
+        editor.objects.say_hidden(editor.current)
     return True
 
 
 def _is_held(editor: Editor) -> bool:
-    """Whether the tool would change the current object, which is locked."""
+    """Whether the tool would change the current object, which is locked, or not seen to move."""
     own, tool = editor.object, editor.view.tool
-    is_changing = tool in CHANGING and tool is not ToolName.SELECT
-    return own is not None and own.is_locked and is_changing
+    if own is None or tool not in CHANGING or tool is ToolName.SELECT:
+        return False
+    return own.is_locked or (not own.is_visible and tool is not ToolName.MASK)
 
 
 def _hover(tool: Tool, editor: Editor, pointer: Pointer) -> PointerShape:

@@ -69,7 +69,7 @@ MENUS: dict[str, tuple[str, ...]] = {
         "quit",
     ),
     "Edit": (
-        "undo", "redo", "-", "copy", "copy_object", "paste", "paste_object", "-",
+        "undo", "redo", "-", "copy_object", "copy", "paste", "paste_object", "-",
         "select_handles",
         "remove_handle", "reset_handle", "reset_handles", "-", "reset_pose", "reset_place",
     ),

@@ -85,7 +85,9 @@ def _draw_tab(editor: Editor, tab: Tab, rect: Rect) -> None:
 
 
 def _is_object_dragged(editor: Editor) -> bool:
-    """Whether the whole object is being moved, so that it can be dropped on a tab."""
+    """Whether the whole object is being moved, or its row, so that it can be dropped on a tab."""
+    if editor.objects.carried is not None:
+        return True
     is_dragging = editor.hand.is_busy and editor.preview is not None
     return is_dragging and editor.view.tool is ToolName.PLACE and editor.hover.part == "move"
 

@@ -125,6 +125,20 @@ def paste() -> Pasted:
     raise ClipboardError("there is no photo in the clipboard")
 
 
+def holds(png: bytes) -> bool:
+    """Whether this picture is in the clipboard; some systems write its file anew."""
+    from PIL import Image
+
+    try:
+        found = paste().data
+        if found == png:
+            return True
+        one, other = (Image.open(io.BytesIO(data)).convert("RGBA") for data in (found, png))
+    except (OSError, ValueError):  # nothing, or no picture that is known here
+        return False
+    return one.size == other.size and one.tobytes() == other.tobytes()
+
+
 def copy(png: bytes) -> None:
     """Put a picture into the clipboard, as a PNG file. Raises ClipboardError."""
     try:
