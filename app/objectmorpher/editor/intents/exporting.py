@@ -332,7 +332,7 @@ class Exporting:
     def copy(self, what: What, offered: Callable[[bytes], None] = lambda png: None) -> None:
         """Put the edited photo, or the current object alone, into the clipboard.
 
-        `offered` is told which PNG file it is.
+        `offered` gets its PNG file.
         """
         editor, document = self._editor, self._editor.committed
         if document is None:
