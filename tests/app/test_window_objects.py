@@ -134,6 +134,7 @@ def test_a_hidden_object_is_not_moved_unseen(
         hands.press("4")
         hands.catch_up()
         assert "Ring: yaw" not in hands.places()
+        hands.press("Right")
         there = hands.on_photo(CENTRE[0] + 60.0, CENTRE[1], size)
         hands.drag(there, hands.on_photo(CENTRE[0] + 70.0, CENTRE[1] - 20.0, size))
         hands.area("Show object")

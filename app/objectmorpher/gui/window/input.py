@@ -347,6 +347,9 @@ class Input:
         is_placing = tool is ToolName.PLACE and editor.is_lifted
         is_posing = tool is ToolName.POSE and bool(editor.posing.selected)
         if (is_placing or is_posing) and not self.crosshair.is_down:
+            if not editor.chosen.is_visible:
+                editor.objects.say_hidden(editor.current)
+                return
             nudge = editor.placing.nudge if is_placing else editor.posing.nudge
             nudge(dx * pace, dy * pace, depth * pace * DEPTH_STEP)
         elif depth == 0:
