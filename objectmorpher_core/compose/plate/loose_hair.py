@@ -2,7 +2,7 @@
 
 A hair is a ridge of lightness, one or two pixels wide, whose two sides look alike. Those that begin
 at the cut-out and end nearby are the object's, unless the background is full of such lines: grass,
-twigs, the grain of wood.
+twigs, the grain of wood. What counts as one was chosen by looking at 44 photographs.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from ...base.arrays import F32, U8, Mask, Pixels, unit_pixels
+from ...base.arrays import F32, U8, Mask, Pixels
 from ...base.masks import box_of, disc
 from ...base.threads import in_threads
 
@@ -42,8 +42,9 @@ def find_loose_hair(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     part, own = pixels[y0:y1, x0:x1], covered[y0:y1, x0:x1]
     scale = min(1.0, SIDE / max(own.shape))
     size = (max(round(own.shape[1] * scale), 1), max(round(own.shape[0] * scale), 1))
-    rgb = cv2.resize(unit_pixels(part), size, interpolation=cv2.INTER_AREA)
-    hides = cv2.resize(own.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0
+    small = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
+    rgb = np.divide(small, np.iinfo(pixels.dtype).max, dtype=np.float32)
+    hides = cv2.resize(own.view(np.uint8) * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 0
     light = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB)[..., 0], np.float32)
     hair = _hair(_uncovered(light, hides), hides, margin * scale)
     large = cv2.resize(hair.astype(np.uint8), own.shape[::-1], interpolation=cv2.INTER_NEAREST)
