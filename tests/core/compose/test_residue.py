@@ -206,6 +206,8 @@ def test_dark_hair_is_no_shadow_and_goes_where_its_object_only_turns():
         for image in (composite(turned).pixels, pixels)
     )
     assert left < 0.25 * before
+    ghosts = find_ghosts(document, SEAM * MARGIN)
+    assert ghosts and not left_out(document, ghosts, MARGIN), "nobody is asked about hair"
 
 
 @pytest.fixture(scope="module")
