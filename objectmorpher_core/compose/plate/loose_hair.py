@@ -27,6 +27,7 @@ LEAST = 1.6  # levels of L by which a hair's middle stands out ...
 TIMES, AROUND = 3.0, 5.0  # ... and x what is usual within so many hole margins
 GOES_ON, SURE = 0.45, 0.15  # x that level: a hair goes on; share of it that is above
 APART, UNLIKE = 3.0, 1.0  # px to both its sides, which differ by less than this x its contrast
+SMALLEST = 120.0  # px, root of the area of an object whose hair is thick enough to be seen
 SHORTEST, GAP, JOINED = 9, 2, 4  # px; what is found may have wider gaps
 FULL, WITHIN = 0.007, 5.0  # share of other lines within so many hole margins, at most
 FILLS = (32.0, 8.0, 2.0)  # px of blur, with which what is covered becomes its surroundings
@@ -64,7 +65,11 @@ def _uncovered(light: F32, hides: Mask) -> F32:
 
 def _hair(light: F32, hides: Mask, margin: float) -> Mask:
     """(h, w) hair in a picture's `light` (h, w), and one px around it."""
-    away = cv2.distanceTransform((~hides).astype(np.uint8), cv2.DIST_L2, 5)
+    away, nearest = cv2.distanceTransformWithLabels(
+        (~hides).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP
+    )
+    nearest = np.asarray(nearest, np.int32)
+    areas = np.bincount(nearest[hides], minlength=int(nearest.max()) + 1)
     near = (away > 0) & (away < 1.1 * FARTHEST * margin)
     line, is_strong = _lines(light, near, away > margin, AROUND * margin)
     closed = cv2.morphologyEx(line.astype(np.uint8), cv2.MORPH_CLOSE, disc(GAP))
@@ -83,7 +88,8 @@ def _hair(light: F32, hides: Mask, margin: float) -> Mask:
     keeps = may_be & (full < FULL) & (strong >= SURE * length)
     keeps &= (length >= SHORTEST) & (extent >= SHORTEST)
     keeps[0] = False
-    hair = cv2.morphologyEx((keeps[labels] & line).astype(np.uint8), cv2.MORPH_CLOSE, disc(JOINED))
+    line &= keeps[labels] & (areas[nearest] > SMALLEST**2)
+    hair = cv2.morphologyEx(line.astype(np.uint8), cv2.MORPH_CLOSE, disc(JOINED))
     return np.asarray(cv2.dilate(hair, disc(1)) > 0)
 
 
