@@ -16,12 +16,15 @@ from scipy.ndimage import map_coordinates
 from ...base.arrays import F32, U8, Mask, Pixels
 from ...base.masks import box_of, disc
 from ...base.threads import in_threads
+from .completion import smooth
 
 FARTHEST = 20.0  # x hole margin: where a line goes on to here, it is the background's
+PICTURE, LOOKED = 1.3, 1.1  # x that: how much is seen around; how far away lines are looked for
 BESIDE = 1.2  # x hole margin: so near to the cut-out a hair begins
 OUTSIDE = 2.0  # x hole margin, from which on other lines are the background's
 SIDE = 1200.0  # px: longer side of the picture in which hair is looked for
-ACROSS, ALONG, RADIUS = 1.0, 3.0, 7  # px: standard deviations of a piece of hair; of its kernel
+ACROSS, ALONG = 1.0, 3.0  # px: standard deviations of a piece of hair
+WIDER, RADIUS = 2.5, 7  # x ACROSS: what is around it; px of the kernel
 DIRECTIONS = 12
 LEAST = 1.6  # levels of L by which a hair's middle stands out ...
 TIMES, AROUND = 3.0, 5.0  # ... and x what is usual within so many hole margins
@@ -30,7 +33,6 @@ APART, UNLIKE = 3.0, 1.0  # px to both its sides, which differ by less than this
 SMALLEST = 120.0  # px, root of the area of an object whose hair is thick enough to be seen
 SHORTEST, GAP, JOINED = 9, 2, 4  # px; what is found may have wider gaps
 FULL, WITHIN = 0.007, 5.0  # share of other lines within so many hole margins, at most
-FILLS = (32.0, 8.0, 2.0)  # px of blur, with which what is covered becomes its surroundings
 
 
 def find_loose_hair(pixels: Pixels, covered: Mask, margin: float) -> Mask:
@@ -39,7 +41,7 @@ def find_loose_hair(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     `margin` is the photo's `hole_margin`, px.
     """
     found, reach = np.zeros_like(covered), FARTHEST * margin
-    x0, y0, x1, y1 = box_of(covered, int(1.3 * reach) + 2)
+    x0, y0, x1, y1 = box_of(covered, int(PICTURE * reach) + 2)
     part, own = pixels[y0:y1, x0:x1], covered[y0:y1, x0:x1]
     scale = min(1.0, SIDE / max(own.shape))
     size = (max(round(own.shape[1] * scale), 1), max(round(own.shape[0] * scale), 1))
@@ -47,20 +49,11 @@ def find_loose_hair(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     rgb = np.divide(small, np.iinfo(pixels.dtype).max, dtype=np.float32)
     hides = cv2.resize(own.view(np.uint8) * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 0
     light = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB)[..., 0], np.float32)
-    hair = _hair(_uncovered(light, hides), hides, margin * scale)
+    light = smooth(light[..., None], (~hides).astype(np.float32))[..., 0]  # the object has no edge
+    hair = _hair(light, hides, margin * scale)
     large = cv2.resize(hair.astype(np.uint8), own.shape[::-1], interpolation=cv2.INTER_NEAREST)
     found[y0:y1, x0:x1] = (large > 0) & ~own
     return found
-
-
-def _uncovered(light: F32, hides: Mask) -> F32:
-    """`light` (h, w) with a smooth continuation where the object `hides` it: it has no edge."""
-    known = (~hides).astype(np.float32)
-    for sigma in FILLS:
-        share = cv2.GaussianBlur(known, (0, 0), sigma)
-        mean = cv2.GaussianBlur(light * known, (0, 0), sigma) / np.maximum(share, 1e-4)
-        light = np.where(hides & (share > 1e-3), mean, light)
-    return np.asarray(light, np.float32)
 
 
 def _hair(light: F32, hides: Mask, margin: float) -> Mask:
@@ -70,7 +63,7 @@ def _hair(light: F32, hides: Mask, margin: float) -> Mask:
     )
     nearest = np.asarray(nearest, np.int32)
     areas = np.bincount(nearest[hides], minlength=int(nearest.max()) + 1)
-    near = (away > 0) & (away < 1.1 * FARTHEST * margin)
+    near = (away > 0) & (away < LOOKED * FARTHEST * margin)
     line, is_strong = _lines(light, near, away > margin, AROUND * margin)
     closed = cv2.morphologyEx(line.astype(np.uint8), cv2.MORPH_CLOSE, disc(GAP))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=8)
@@ -94,7 +87,7 @@ def _hair(light: F32, hides: Mask, margin: float) -> Mask:
 
 
 def _lines(light: F32, where: Mask, usual: Mask, sigma: float) -> tuple[Mask, Mask]:
-    """(h, w) the ridges of a picture's `light` (h, w) that are looked for `where`; the strong ones.
+    """(h, w) the ridges of a picture's `light` (h, w) in `where` (h, w); (h, w) the strong ones.
 
     How much stands out is measured where it is `usual` (h, w), over `sigma` px.
     """
@@ -147,7 +140,7 @@ def _kernels() -> tuple[F32, ...]:
         cos, sin = np.cos(np.pi * k / DIRECTIONS), np.sin(np.pi * k / DIRECTIONS)
         u, v = (x * cos + y * sin) / ALONG, (y * cos - x * sin) / ACROSS
         ridge = (1 - v * v) * np.exp(-0.5 * (u * u + v * v))
-        wide = np.exp(-0.5 * (u * u + v * v / 6.25))
+        wide = np.exp(-0.5 * (u * u + (v / WIDER) ** 2))
         ridge -= wide * (ridge.sum() / wide.sum())
         kernels.append(np.asarray(2 * ridge / np.abs(ridge).sum(), np.float32))
     return tuple(kernels)

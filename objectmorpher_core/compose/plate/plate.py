@@ -91,7 +91,8 @@ def build_plate(
         raise InpaintError("the object is too thin to be cut out of the photo")
     height, width = covered.shape
     margin = hole_margin(width, height)
-    residue, hair = (find(pixels, covered, margin) for find in (find_residue, find_loose_hair))
+    residue = find_residue(pixels, covered, margin)
+    hair = find_loose_hair(pixels, covered, margin)
     away = distance(covered | residue | hair)
     hole = away < margin
     rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))

@@ -170,8 +170,8 @@ MOVED = (1.0, 6.0)  # px of the photo: from here on it begins to be shown, and f
 STEPS = 4  # in which it appears
 NEAREST = 4  # control points that say how what stands beside it has moved
 SHADE, TINTED = 0.25, 0.4  # tint, up to which a ghost is a shadow, and up to which it may be one
-SPARSE = 0.15  # median over nearly the most change, up to which a ghost may be hair ...
-FOOT = 0.75  # ... or else a shadow, where it lies so much below its owner, of [-1, 1]
+SPARSE = 0.15  # median over nearly the most change, up to which a ghost looks like hair
+FOOT = 0.75  # how far below its owner, in [-1, 1], what looks so may be a shadow on rough ground
 BLACK = 0.02  # of sRGB's range, added before ratios are taken
 
 
@@ -184,7 +184,7 @@ class Ghost:
     owner: int  # index of the object beside it
     points: I64  # the object's control points that are nearest; empty where it is not lifted
     tint: float  # see `tint_of`; infinite where it is not darker than the plate, or is hair
-    is_hair: bool = False  # it looks like hair, or a rough shadow at the foot
+    is_hair: bool = False  # it looks like hair; at the foot it may be a shadow on rough ground
 
     @property
     def may_be_shade(self) -> bool:

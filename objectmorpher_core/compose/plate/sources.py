@@ -104,7 +104,7 @@ LEAST_REACH = 8.0  # px
 STRANGE_COST = 2000.0  # squared levels of 255 that a source of a strange colour costs
 SUBJECT_COST = 6000.0  # squared levels of 255 that a source on the subject costs
 MOST_SUBJECT = 0.5  # share of what is around the hole: more, and the hole is amid the subject
-MOST_HOLE = 0.5  # share of a subject that is the hole: of more, it is none
+MOST_HOLE, RIM = 0.5, 9  # share of a subject that is the hole: of more, it is none; px around it
 BINS = 12  # of each channel of CIE Lab
 RARE = 0.002  # share of what is around the hole that a colour must have, or it is none of it
 SMOOTHING = 2.0  # px, over which a source's colour is taken
@@ -138,14 +138,14 @@ def subject(picture: RGB, around: Mask, hole: Mask) -> F32:
 def beside_hole(salience: F32, hole: Mask) -> F32:
     """`salience` (h, w) in [0, 1] without what is mostly a `hole` (h, w).
 
-    A smooth guess in a meadow strikes the network, and with it the grass around.
+    The smooth guess in a meadow's hole strikes the network, and the grass around with it.
     """
     count, labels = cv2.connectedComponents((salience > 0.5).astype(np.uint8))
     labels = np.asarray(labels, np.int32)
     own, whole = (np.bincount(part, minlength=count) for part in (labels[hole], labels.ravel()))
     is_hole = own > MOST_HOLE * whole
     is_hole[0] = False
-    near = cv2.dilate(is_hole[labels].astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    near = cv2.dilate(is_hole[labels].astype(np.uint8), np.ones((RIM, RIM), np.uint8)) > 0
     return np.where(near, np.float32(0), salience)
 
 
