@@ -181,9 +181,10 @@ edges that enter a hole on two sides go on through it, and the subject of the ph
 sees it; without its weights, colours that do not occur around the hole) is an unlikely source, so
 that hair does not grow over the wall (*flag and wall*). Without the
 edges that go on, the eight holes lose 0.4 dB and the ten 0.1; without the subject, the eight lose
-0.4 and the ten nothing. What is mostly the hole itself is no subject: its smooth guess amid grass
-strikes the network, and grass beside it was unlikely; behind a car in a meadow came a house's
-boards. The mean PSNR of 40 other holes, cut where nothing stands, rises by 0.01 dB.
+0.4 and the ten nothing. A subject that is mostly the hole itself does not count: amid grass the
+hole's smooth guess looks like one to the network, and made the grass around it an unlikely source,
+so that a house's boards appeared behind a car in a meadow. The mean PSNR of 40 other holes, cut
+where nothing stands, rises by 0.01 dB for it.
 What patches say of large areas is one of
 many answers: the colours of these are drawn a third of the way to the smooth mean of what is
 around, edges and detail stay. It does not understand what it copies:
