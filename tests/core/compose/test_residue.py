@@ -206,11 +206,15 @@ def test_dark_hair_is_no_shadow_and_goes_where_its_object_only_turns():
         for image in (composite(turned).pixels, pixels)
     )
     assert left < 0.5 * before
-    ghosts = find_ghosts(document, SEAM * MARGIN)
-    whole, asked = (
+    ghosts, plate = find_ghosts(document, SEAM * MARGIN), document.plate
+    assert plate is not None
+    upper = [ghost for ghost in ghosts if plate.top + ghost.box[3] < 190]
+    shade = [ghost for ghost in upper if ghost.may_be_shade]
+    whole, high, dark, asked = (
         sum(ghost.there.sum() for ghost in some)
-        for some in (ghosts, left_out(document, ghosts, MARGIN))
+        for some in (ghosts, upper, shade, left_out(document, ghosts, MARGIN))
     )
+    assert high > 0 and dark < 0.02 * high
     assert asked < 0.1 * whole, "nobody is asked about hair"
 
 
