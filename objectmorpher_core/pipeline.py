@@ -40,6 +40,7 @@ from .document.model import (
 )
 from .document.settings import Hint
 from .lift.beyond_frame import cut_out_beyond
+from .lift.loose_hair import with_hair_along, with_loose_hair
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
 from .lift.registration.other_photo import OtherPhoto, with_photo
 from .lift.relief.depth_look import look_at_all
@@ -120,10 +121,12 @@ def lift_mask(
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
     matte = cut_out_beyond(pixels, mask, mixed)
+    whole = with_loose_hair(pixels, matte)
     if use_matte is not None:
-        use_matte(matte)
+        use_matte(whole)
     subject = lift.LiftSubject(pixels, camera, is_selected(mask), matte)
-    return matte, lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
+    lifted = lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
+    return whole, with_hair_along(lifted, matte, whole, camera, seed)
 
 
 def cut_front(pixels: Pixels, mask: Selection, mixed: Mask | None = None) -> Matte:

@@ -116,8 +116,7 @@ def lifted_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         for owner, name in (
-            (ReliefLifter, "lift"), (plate, "find_residue"), (plate, "find_loose_hair"),
-            (background, "find_old_shadow"),
+            (ReliefLifter, "lift"), (plate, "find_residue"), (background, "find_old_shadow"),
         ):  # fmt: skip
             patch.setattr(owner, name, _remembering(getattr(owner, name)))
         yield

@@ -40,6 +40,7 @@ from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width
 from . import LiftError, LiftSubject, load
 from .beyond_frame import cut_out_beyond
+from .loose_hair import with_hair_along, with_loose_hair
 from .registration.imported import ImportTarget, rematted
 from .relief.spreading import BRIM
 
@@ -402,14 +403,17 @@ def refit_object(
     if not changed.any():
         return was.matte, was.lifted
     away = cv2.distanceTransform((~changed).astype(np.uint8), cv2.DIST_L2, 5)
-    matte = _blended(was.matte, cut_out_beyond(scene.pixels, scene.mask, scene.mixed), away)
+    bare = cut_out_beyond(scene.pixels, scene.mask, scene.mixed)
+    whole = with_loose_hair(scene.pixels, bare)
+    matte = _blended(was.matte, whole, away)
     camera, lifted = scene.camera, was.lifted
     if lifted.middle is None:
         shown = rematted(lifted, matte, camera, seed)
         return matte, replace(shown, backend=lifted.backend)
     lifter = load("relief")  # the only one that knows a middle sheet
-    subject = LiftSubject(scene.pixels, camera, is_selected(scene.mask), matte)
+    subject = LiftSubject(scene.pixels, camera, is_selected(scene.mask), bare)
     fresh = lifter.lift(subject, was.shape, part(progress, 0.3, 1.0), seed)
+    fresh = with_hair_along(fresh, bare, whole, camera, seed)
     spacing = lifted.spacing * lifted.scale * camera.focal / float(lifted.centre[2])
     reach = band_width(camera.width, camera.height) + BRIM * spacing
     return matte, refitted_shape(lifted, fresh, changed, reach)

@@ -21,7 +21,6 @@ from ...document.settings import Hint
 from ...document.transparency import alpha_behind
 from .. import Inpainter, InpaintError, LooksFar, TakesHints
 from ..blend import Box, distance
-from .loose_hair import find_loose_hair
 from .residue import (
     BLACK,
     TINTED,
@@ -92,8 +91,7 @@ def build_plate(
     height, width = covered.shape
     margin = hole_margin(width, height)
     residue = find_residue(pixels, covered, margin)
-    hair = find_loose_hair(pixels, covered, margin)
-    away = distance(covered | residue | hair)
+    away = distance(covered | residue)
     hole = away < margin
     rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
     box = (int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
@@ -110,7 +108,7 @@ def build_plate(
     fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
     if residue.any():
         residue[inner] = visible_residue(residue[inner], photo, fill)
-        away = distance(covered | residue | hair)
+        away = distance(covered | residue)
     weight = fill_weight(away[inner].copy(), margin)
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true

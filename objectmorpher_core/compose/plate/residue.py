@@ -170,8 +170,6 @@ MOVED = (1.0, 6.0)  # px of the photo: from here on it begins to be shown, and f
 STEPS = 4  # in which it appears
 NEAREST = 4  # control points that say how what stands beside it has moved
 SHADE, TINTED = 0.25, 0.4  # tint, up to which a ghost is a shadow, and up to which it may be one
-SPARSE = 0.15  # median over nearly the most change, up to which a ghost looks like hair
-FOOT = 0.75  # how far below its owner, in [-1, 1], what looks so may be a shadow on rough ground
 BLACK = 0.02  # of sRGB's range, added before ratios are taken
 
 
@@ -183,8 +181,7 @@ class Ghost:
     there: Mask  # (h, w) of the box
     owner: int  # index of the object beside it
     points: I64  # the object's control points that are nearest; empty where it is not lifted
-    tint: float  # see `tint_of`; infinite where it is not darker than the plate, or is hair
-    is_hair: bool = False  # it looks like hair; at the foot it may be a shadow on rough ground
+    tint: float  # see `tint_of`; infinite where it is not darker than the plate
 
     @property
     def may_be_shade(self) -> bool:
@@ -220,34 +217,19 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
         row, column = np.unravel_index(int(np.argmin(gaps[owner])), there.shape)
         foot = np.array([column + x0 + plate.left, row + y0 + plate.top])
         points = _nearest_points(document.objects[owner], document.photo.camera, foot)
-        seen, behind = _looks(document, plate, box, there)
-        tint, is_hair = _tint(seen, behind), _is_hair(seen, behind)
-        down = cv2.Sobel(away[owner][inner], cv2.CV_32F, 0, 1, scale=1 / 8)
-        if is_hair and down[there].mean() < FOOT:
-            tint = np.inf
-        ghosts.append(Ghost(box, there, owner, points, tint, is_hair))
+        ghosts.append(Ghost(box, there, owner, points, _tint(document, plate, box, there)))
     return tuple(ghosts)
 
 
-def _looks(document: Document, plate: Plate, box: Box, there: Mask) -> tuple[F32, F32]:
-    """(n, 3) sRGB of the photo and of the plate, what is `there` (h, w) in a box of the plate."""
+def _tint(document: Document, plate: Plate, box: Box, there: Mask) -> float:
+    """Return `Ghost.tint` of what is `there` (h, w) in a box of the plate."""
     x0, y0, x1, y1 = box
     photo = document.photo.pixels[plate.top : plate.box[3], plate.left : plate.box[2]]
-    seen, behind = (unit_pixels(part[y0:y1, x0:x1][there]) for part in (photo, plate.pixels))
-    return seen + np.float32(BLACK), behind + np.float32(BLACK)
-
-
-def _tint(seen: F32, behind: F32) -> float:
-    """Return `tint_of` a ghost, `seen` (n, 3) before `behind` (n, 3); infinite if not darker."""
-    change = np.log(seen.mean(0) / behind.mean(0))
+    seen, behind = (
+        unit_pixels(image[y0:y1, x0:x1][there]).mean(0) + BLACK for image in (photo, plate.pixels)
+    )
+    change = np.log(seen / behind)
     return float(tint_of(change)) if change.max() < 0 else np.inf
-
-
-def _is_hair(seen: F32, behind: F32) -> bool:
-    """Whether less than half of a ghost (n, 3), see `_tint`, differs from what is behind."""
-    change = np.log(behind / seen).mean(-1)
-    change *= np.sign(change.mean())
-    return bool(np.median(change) < SPARSE * np.quantile(change, 0.95))
 
 
 def tint_of(darker: np.ndarray) -> np.ndarray:
@@ -386,15 +368,14 @@ LEAST_PART = 1.5  # x hole margin, squared: a smaller piece is hardly worth a qu
 
 
 def left_out(document: Document, ghosts: Sequence[Ghost], margin: float) -> tuple[Ghost, ...]:
-    """The ghosts that look like a part of their object rather than like its shadow or hair.
+    """The ghosts that look like a part of their object rather than like its shadow.
 
     `margin` is the photo's `hole_margin`, px.
     """
     if document.plate is None:
         return ()
     least = (LEAST_PART * margin) ** 2
-    large = [g for g in ghosts if np.count_nonzero(g.there) >= least]
-    return tuple(g for g in large if g.tint >= SHADE and not g.is_hair)
+    return tuple(g for g in ghosts if np.count_nonzero(g.there) >= least and g.tint >= SHADE)
 
 
 def with_parts(mask: Mask, document: Document, parts: Sequence[Ghost], margin: float) -> Mask:
@@ -454,7 +435,7 @@ def erased_by(
     `margin` is the photo's `hole_margin`, px.
     """
     parts, least = left_out(document, ghosts, margin), (LEAST_PART * margin) ** 2
-    gone = [g for g, share in zip(ghosts, shares, strict=True) if share > 0 and not g.is_hair]
+    gone = [g for g, share in zip(ghosts, shares, strict=True) if share > 0]
     found = []
     for owner in sorted({g.owner for g in gone}):
         pieces = [(g, _unlike_fill(g, document)) for g in gone if g.owner == owner]

@@ -121,7 +121,7 @@ def with_strands(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int =
     wanted = ragged[roots] * lifted.spacing**2 / (AREA * length[roots] ** 2)
     wanted *= min(1.0, MOST / wanted.sum())
     roots = np.repeat(roots, np.floor(wanted + rng.random(len(roots))).astype(int))
-    return _Growth(lifted, rest, roots, length[roots], px[roots]).grown(camera, rng)
+    return _Growth(lifted, rest, roots, length[roots], px[roots]).grown(rng)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,31 +134,11 @@ class _Growth:
     length: F64  # (n,) object units
     px: F64  # (n,) object units in a px of the photo there
 
-    def grown(self, camera: Camera, rng: np.random.Generator) -> LiftedObject:
+    def grown(self, rng: np.random.Generator) -> LiftedObject:
         """The object with its strands after its Gaussians."""
-        lifted, count = self.lifted, len(self.roots)
-        strands = self._strands(rng)
-        gaussians, texture, sides = lifted.gaussians, lifted.texture, lifted.sides
-        nothing, whole = np.zeros(count), np.ones(count)
-        if sides is not None:
-            none = np.zeros((count, 2)), np.zeros((count, 2, 3)), nothing
-            at, slopes, zoom = map(_joined, (sides.at, sides.slopes, sides.zoom), none)
-            real = None if sides.real is None else np.append(sides.real, nothing > 0)
-            sides = replace(sides, at=at, slopes=slopes, zoom=zoom, real=real)
-        return replace(
-            lifted, sides=sides,
-            gaussians=Gaussians(
-                *(_joined(*both) for both in zip(
-                    vars(gaussians).values(), vars(strands).values(), strict=True
-                ))
-            ),
-            texture=PhotoTexture(
-                _joined(texture.u0, texture.u0[self.roots]), _joined(texture.visibility, nothing),
-                _joined(texture.solidity, whole),
-            ),
-            middle=None if lifted.middle is None
-            else _joined(lifted.middle, lifted.middle[self.roots]),
-        )  # fmt: skip
+        count, seen = len(self.roots), self.lifted.texture
+        texture = PhotoTexture(seen.u0[self.roots], np.zeros(count), np.ones(count))
+        return appended(self.lifted, self._strands(rng), texture, self.roots)
 
     def _strands(self, rng: np.random.Generator) -> Gaussians:
         lifted, roots, count = self.lifted, self.roots, len(self.roots)
@@ -194,6 +174,25 @@ class _Growth:
             shown = np.where(sides.zoom[self.roots, None] != 0, own, shown)
         light = np.exp(rng.normal(0, UNEVEN, (len(shown), 1)))
         return np.asarray((shown * light).clip(0, 1), np.float32)
+
+
+def appended(
+    lifted: LiftedObject, gaussians: Gaussians, texture: PhotoTexture, like: np.ndarray
+) -> LiftedObject:
+    """An object with further `gaussians` (n,), each as deep as the one that it is `like` (n,)."""
+    sides, own, seen = lifted.sides, lifted.gaussians, lifted.texture
+    if sides is not None:
+        nothing = np.zeros(len(like))
+        none = np.zeros((len(like), 2)), np.zeros((len(like), 2, 3)), nothing
+        at, slopes, zoom = map(_joined, (sides.at, sides.slopes, sides.zoom), none)
+        real = None if sides.real is None else np.append(sides.real, nothing > 0)
+        sides = replace(sides, at=at, slopes=slopes, zoom=zoom, real=real)
+    return replace(
+        lifted, sides=sides, gaussians=Gaussians(*map(_joined, vars(own).values(),
+                                                      vars(gaussians).values())),
+        texture=PhotoTexture(*map(_joined, vars(seen).values(), vars(texture).values())),
+        middle=None if lifted.middle is None else _joined(lifted.middle, lifted.middle[like]),
+    )  # fmt: skip
 
 
 def _unit(vectors: F64) -> F64:

@@ -16,7 +16,6 @@ from objectmorpher_core.base.arrays import F32, Mask, Pixels, crop
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.order import holes
 from objectmorpher_core.compose.plate import plate as plates
-from objectmorpher_core.compose.plate.loose_hair import find_loose_hair
 from objectmorpher_core.compose.plate.plate import (
     SEAM,
     build_plate,
@@ -64,12 +63,12 @@ def _scene(name: str, source: str, ground: str) -> tuple[Pixels, Pixels, Mask]:
     there = np.s_[top : top + size[1], left : left + size[0]]
     whole, full = np.zeros((HEIGHT, WIDTH), np.float32), np.zeros((HEIGHT, WIDTH, 3), np.float32)
     whole[there], full[there] = alpha, colour
-    behind = _background(ground)
+    behind = background(ground)
     mixed = behind / np.float32(255) * (1 - whole[..., None]) + full * whole[..., None]
     return np.rint(mixed * 255).astype(np.uint8), behind, whole > 0.5
 
 
-def _background(name: str) -> Pixels:
+def background(name: str) -> Pixels:
     if name == "wood":
         picture = photo("coffee")[300:, 420:]
     elif name == "brick":
@@ -131,103 +130,11 @@ def test_beside_a_good_selection_hardly_anything_is_replaced(name, source, groun
     assert needless.sum() < 0.06 * covered.sum()
 
 
-DISC = np.hypot(*(np.indices((HEIGHT, WIDTH)) - np.array([[[190]], [[240]]]))) < 80
-
-
-def _hairs(seed: int, count: int = 12) -> tuple[F32, Mask]:
-    """(h, w) how much hair covers each pixel about the disc; (h, w) True along its middle."""
-    rng = np.random.default_rng(seed)
-    cover, middle = np.zeros((2 * HEIGHT, 2 * WIDTH), np.uint8), np.zeros((HEIGHT, WIDTH), np.uint8)
-    for angle in rng.uniform(0, 2 * np.pi, count):
-        steps = np.linspace(0, rng.uniform(20, 45), 20)
-        angles = angle + rng.normal(0, 0.012) * steps
-        lines = np.stack([240 + (78 + steps) * np.cos(angles), 190 + (78 + steps) * np.sin(angles)])
-        cv2.polylines(cover, [np.rint(2 * lines.T).astype(np.int32)], False, 255, 2, cv2.LINE_AA)
-        cv2.polylines(middle, [np.rint(lines.T).astype(np.int32)], False, 1)
-    small = cv2.resize(cover, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    return np.asarray(small / np.float32(255), np.float32), np.asarray((middle > 0) & ~DISC)
-
-
-def _ground(name: str, rng: np.random.Generator) -> F32:
-    """(h, w, 3) levels of a background, out of focus unless it is one of scikit-image's."""
-    if name in ("brick", "grass", "gravel"):
-        picture = np.repeat(getattr(data, name)()[:HEIGHT, :WIDTH, None], 3, 2)
-    elif name in ("wood", "street"):
-        picture = _background(name)
-    elif name == "edge":  # of a table, which ends at the object
-        picture = np.full((HEIGHT, WIDTH, 3), 90.0)
-        picture[200:] = 170
-    elif name == "wire":  # which goes on behind it
-        picture = np.full((HEIGHT, WIDTH, 3), 150.0)
-        cv2.line(picture, (0, 90), (WIDTH, 260), (60, 60, 60), 2, cv2.LINE_AA)
-    else:
-        picture = rng.uniform(110, 190, (6, 8, 3))
-    picture = cv2.resize(picture.astype(np.float32), (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
-    return np.asarray(picture + rng.normal(0, 1.5, picture.shape), np.float32)
-
-
-@pytest.mark.parametrize("tone", [20.0, 240.0])
-def test_hair_that_begins_at_the_object_is_found(tone: float):
-    found, there, replaced = 0, 0, []
-    for seed in range(4):
-        ground = _ground("blurred", np.random.default_rng(seed))
-        cover, middle = _hairs(seed)
-        mixed = ground + cover[..., None] * (tone - ground)
-        mixed[DISC] = tone
-        pixels = np.rint(mixed.clip(0, 255)).astype(np.uint8)
-        hair = find_loose_hair(pixels, DISC, MARGIN)
-        found, there = found + (hair & middle).sum(), there + middle.sum()
-        replaced.append((hair & (_away(middle) > 6)).mean())
-    assert found > 0.85 * there
-    assert max(replaced) < 0.001  # of the photo, where no hair is
-
-
-@pytest.mark.parametrize(
-    "ground", ["blurred", "brick", "grass", "gravel", "wood", "street", "edge", "wire"]
-)
-def test_the_lines_of_a_background_are_no_hair(ground: str):
-    pixels = _ground(ground, np.random.default_rng(0))
-    pixels[DISC] = 30
-    pixels = np.rint(pixels.clip(0, 255)).astype(np.uint8)
-    assert find_loose_hair(pixels, DISC, MARGIN).sum() < 0.005 * DISC.sum()
-
-
-def test_dark_hair_is_no_shadow_and_goes_where_its_object_only_turns():
-    cover, middle = _hairs(1)
-    ground = _ground("blurred", np.random.default_rng(1))
-    mixed = ground + cover[..., None] * (20 - ground)
-    mixed[DISC] = 20
-    pixels = np.rint(mixed.clip(0, 255)).astype(np.uint8)
-    document = _lifted(pixels, DISC)
-    turned = edits.set_placement(document, 0, Placement(turn=(20.0, 0.0, 0.0)))
-    middle &= (_away(DISC) > MARGIN) & (np.indices(DISC.shape)[0] < 190)  # not at the foot
-    left, before = (
-        np.abs(image.astype(float) - ground).mean(-1)[middle].mean()
-        for image in (composite(turned).pixels, pixels)
-    )
-    assert left < 0.5 * before
-    ghosts, plate = find_ghosts(document, SEAM * MARGIN), document.plate
-    assert plate is not None
-    upper = [ghost for ghost in ghosts if plate.top + ghost.box[3] < 190]
-    shade = [ghost for ghost in upper if ghost.may_be_shade]
-    whole, high, dark, asked = (
-        sum(ghost.there.sum() for ghost in some)
-        for some in (ghosts, upper, shade, left_out(document, ghosts, MARGIN))
-    )
-    assert high > 0 and dark < 0.02 * high
-    assert asked < 0.1 * whole, "nobody is asked about hair"
-
-
 @pytest.fixture(scope="module")
 def footless() -> Document:
     """A lifted patch whose lower end was left out."""
     pixels, _, own = _scene("patch", "astronaut", "street")
-    return _lifted(pixels, _missing(own, "foot"))
-
-
-def _lifted(pixels: Pixels, mask: Mask) -> Document:
-    """A document whose one object is what a mask covers, with a background behind it."""
-    view = camera(WIDTH, HEIGHT)
+    view, mask = camera(WIDTH, HEIGHT), _missing(own, "foot")
     document = Document(Photo(Picture(pixels), view, png(pixels), "patch.png"))
     document = edits.set_mask(edits.add_object(document), 0, mask, Prompt())
     document = edits.set_lifted(document, 0, *lift_mask(pixels, view, mask, "relief"))

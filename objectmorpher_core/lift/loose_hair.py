@@ -3,42 +3,54 @@
 A hair is a ridge of lightness, one or two pixels wide, whose two sides look alike. Those that begin
 at the cut-out and end nearby are the object's, unless the background is full of such lines: grass,
 twigs, the grain of wood. What counts as one was chosen by looking at 44 photographs.
+
+The object's shape is made without it, and it goes along, as deep as the outline beside it: it would
+be taken for the edge's softness, else.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
 import numpy as np
 from scipy.ndimage import map_coordinates
+from scipy.spatial import cKDTree
 
-from ...base.arrays import F32, U8, Mask, Pixels
-from ...base.masks import box_of, disc
-from ...base.threads import in_threads
-from .completion import smooth
+from ..base.arrays import F32, U8, Mask, Pixels, crop, unit_pixels
+from ..base.camera import Camera
+from ..base.masks import box_of, disc
+from ..base.rotations import quats_along
+from ..base.threads import in_threads
+from ..document.model import HAIR, Gaussians, LiftedObject, Matte, PhotoTexture
+from ..segment.matting.matte import band_width
+from ..segment.matting.unmix import coarse_colours
+from .relief.strands import appended, hair_of
 
-FARTHEST = 20.0  # x hole margin: where a line goes on to here, it is the background's
+FARTHEST = 20.0  # x margin: where a line goes on to here, it is the background's
 PICTURE, LOOKED = 1.3, 1.1  # x that: how much is seen around; how far away lines are looked for
-BESIDE = 1.2  # x hole margin: so near to the cut-out a hair begins
-OUTSIDE = 2.0  # x hole margin, from which on other lines are the background's
+BESIDE = 1.2  # x margin: so near to the cut-out a hair begins
+OUTSIDE = 2.0  # x margin, from which on other lines are the background's
 SIDE = 1200.0  # px: longer side of the picture in which hair is looked for
 ACROSS, ALONG = 1.0, 3.0  # px: standard deviations of a piece of hair
 WIDER, RADIUS = 2.5, 7  # x ACROSS: what is around it; px of the kernel
 DIRECTIONS = 12
 LEAST = 1.6  # levels of L by which a hair's middle stands out ...
-TIMES, AROUND = 3.0, 5.0  # ... and x what is usual within so many hole margins
+TIMES, AROUND = 3.0, 5.0  # ... and x what is usual within so many margins
 GOES_ON, SURE = 0.45, 0.15  # x that level: a hair goes on; share of it that is above
 APART, UNLIKE = 3.0, 1.0  # px to both its sides, which differ by less than this x its contrast
 SMALLEST = 120.0  # px, root of the area of an object whose hair is thick enough to be seen
-SHORTEST, GAP, JOINED = 9, 2, 4  # px; what is found may have wider gaps
-FULL, WITHIN = 0.007, 5.0  # share of other lines within so many hole margins, at most
+SHORTEST, GAP, WIDTH = 9, 2, 1  # px; to both sides of the middle
+FULL, WITHIN = 0.007, 5.0  # share of other lines within so many margins, at most
+RAGGED = 0.05  # mean of that over an outline (`hair_of`), below which nothing beside it is hair
+EVIDENCE = 0.25  # x the root of the object's area: that mean times the px of hair, at least
 
 
 def find_loose_hair(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     """(H, W) True where the photo (H, W, 3) shows hair of what is `covered` (H, W).
 
-    `margin` is the photo's `hole_margin`, px.
+    `margin`: a hundredth of the photo's diagonal, px.
     """
     found, reach = np.zeros_like(covered), FARTHEST * margin
     x0, y0, x1, y1 = box_of(covered, int(PICTURE * reach) + 2)
@@ -48,8 +60,9 @@ def find_loose_hair(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     small = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
     rgb = np.divide(small, np.iinfo(pixels.dtype).max, dtype=np.float32)
     hides = cv2.resize(own.view(np.uint8) * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 0
+    _, behind = coarse_colours(rgb, hides.astype(np.float32))
+    rgb[hides] = behind[hides]  # the object has no edge
     light = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB)[..., 0], np.float32)
-    light = smooth(light[..., None], (~hides).astype(np.float32))[..., 0]  # the object has no edge
     hair = _hair(light, hides, margin * scale)
     large = cv2.resize(hair.astype(np.uint8), own.shape[::-1], interpolation=cv2.INTER_NEAREST)
     found[y0:y1, x0:x1] = (large > 0) & ~own
@@ -57,7 +70,7 @@ def find_loose_hair(pixels: Pixels, covered: Mask, margin: float) -> Mask:
 
 
 def _hair(light: F32, hides: Mask, margin: float) -> Mask:
-    """(h, w) hair in a picture's `light` (h, w), and one px around it."""
+    """(h, w) hair in a picture's `light` (h, w)."""
     away, nearest = cv2.distanceTransformWithLabels(
         (~hides).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP
     )
@@ -82,8 +95,7 @@ def _hair(light: F32, hides: Mask, margin: float) -> Mask:
     keeps &= (length >= SHORTEST) & (extent >= SHORTEST)
     keeps[0] = False
     line &= keeps[labels] & (areas[nearest] > SMALLEST**2)
-    hair = cv2.morphologyEx(line.astype(np.uint8), cv2.MORPH_CLOSE, disc(JOINED))
-    return np.asarray(cv2.dilate(hair, disc(1)) > 0)
+    return np.asarray(cv2.dilate(line.astype(np.uint8), disc(WIDTH)) > 0)
 
 
 def _lines(light: F32, where: Mask, usual: Mask, sigma: float) -> tuple[Mask, Mask]:
@@ -154,3 +166,103 @@ def _around(image: np.ndarray, sigma: float) -> F32:
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     mean = cv2.GaussianBlur(small, (0, 0), sigma / step)
     return np.asarray(cv2.resize(mean, image.shape[::-1]), np.float32)
+
+
+# How much of a pixel a hair covers cannot be seen, only that times how unlike the background it is.
+# It is taken to be little, so that nothing of the background comes along.
+
+MARGIN = 2.5  # x the matte's band
+CONTEXT = 8  # x margin, seen around it
+BEHIND = (0.3, 0.7, 1.4)  # x margin, standard deviations over which what is behind is averaged
+MORE = 1.25  # x the least that it can cover
+FAINTEST = 0.02  # alpha that is kept
+
+
+def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:
+    """A `matte` of the photo (H, W, 3) and the hair beside it; the same one where there is none."""
+    hair = hair_of(matte.alpha)
+    if hair is None or hair.mean < RAGGED:
+        return matte
+    height, width = pixels.shape[:2]
+    frame, margin = (0, 0, width, height), MARGIN * band_width(width, height)
+    covered = crop(matte.alpha, matte.box, frame) > 0
+    loose = find_loose_hair(pixels, covered, margin)
+    if hair.mean * np.count_nonzero(loose) < EVIDENCE * hair.root:
+        return matte  # of a smooth thing even a long line is likely to be none
+    own = box_of(loose)
+    (x0, y0, x1, y1), (left, top, right, bottom) = matte.box, own
+    box = min(x0, left - 1), min(y0, top - 1), max(x1, right + 1), max(y1, bottom + 1)
+    pads = [(y0 - box[1], box[3] - y1), (x0 - box[0], box[2] - x1)]
+    alpha = np.pad(matte.alpha, pads)
+    foreground = np.pad(matte.foreground, [*pads, (0, 0)], mode="edge")
+    window = np.s_[top - box[1] : bottom - box[1], left - box[0] : right - box[0]]
+    share, colours = _unmixed(pixels, loose, covered, own, margin)
+    is_hair = share > 0
+    alpha[window][is_hair] = share[is_hair]
+    foreground[window][is_hair] = colours[is_hair]
+    return replace(matte, left=box[0], top=box[1], alpha=alpha, foreground=foreground)
+
+
+def _unmixed(
+    pixels: Pixels, loose: Mask, covered: Mask, own: tuple[int, int, int, int], margin: float
+) -> tuple[F32, F32]:
+    """Alpha (h, w) and colours (h, w, 3) of the hair that is `loose` (H, W), in its box `own`."""
+    x0, y0, x1, y1 = box_of(loose, int(np.ceil(CONTEXT * margin)))
+    part = np.s_[y0:y1, x0:x1]
+    rgb, there = unit_pixels(pixels[part]), loose[part]
+    is_bare = ~covered[part] & (cv2.dilate(there.astype(np.uint8), disc(2)) == 0)
+    bare, total = is_bare.astype(np.float32), np.full(there.shape, 1e-9, np.float32)
+    behind = np.zeros_like(rgb)
+    for n, size in enumerate(BEHIND):
+        blur, share = ((0, 0), size * margin), np.float32(100.0**-n)
+        total += share * cv2.GaussianBlur(bare, *blur)
+        behind += share * np.asarray(cv2.GaussianBlur(rgb * bare[..., None], *blur), np.float32)
+    behind /= total[..., None]
+    change = (rgb - behind) * there[..., None]
+    room = np.maximum(np.where(change > 0, 1 - behind, behind), 1e-3)
+    alpha = (MORE * (np.abs(change) / room).max(-1)).clip(0, 1)
+    alpha = np.where(alpha >= FAINTEST, alpha, 0).astype(np.float32)
+    colours = (behind + change / np.maximum(alpha, FAINTEST)[..., None]).clip(0, 1)
+    left, top, right, bottom = own
+    inner = np.s_[top - y0 : bottom - y0, left - x0 : right - x0]
+    return alpha[inner], np.asarray(colours[inner], np.float32)
+
+
+UNEVEN = 0.3  # x what is usual between two Gaussians, by which these are off a grid
+FLAT = 0.1  # x their width
+
+
+def with_hair_along(
+    lifted: LiftedObject, matte: Matte, whole: Matte, camera: Camera, seed: int = 0
+) -> LiftedObject:
+    """What was `lifted` from a `matte` with the loose hair of the `whole` one.
+
+    It faces the camera, as deep as the soft edge beside it, of which only a relief has one; else it
+    stays away.
+    """
+    edge = np.flatnonzero(lifted.texture.solidity < 0.5)
+    if whole is matte or not len(edge) or not lifted.splatting.startswith("edged"):
+        return lifted
+    pitch = lifted.spacing * lifted.scale * camera.focal / float(lifted.centre[2])
+    is_new = (whole.alpha > 0) & (crop(matte.alpha, matte.box, whole.box) <= 0)
+    wide = 2 * int(np.ceil(pitch)) + 1
+    near = cv2.dilate(is_new.astype(np.uint8), np.ones((wide, wide), np.uint8))
+    height, width = near.shape
+    rows, columns = np.mgrid[0:height:pitch, 0:width:pitch].reshape(2, -1)
+    xy = np.column_stack([columns, rows])
+    xy += pitch * np.random.default_rng(seed).uniform(0, UNEVEN, xy.shape)
+    x, y = np.minimum(xy.astype(int), [width - 1, height - 1]).T
+    xy = xy[near[y, x] > 0] + [whole.left, whole.top]
+    like = edge[cKDTree(lifted.texture.u0[edge]).query(xy)[1]]
+    depth = lifted.world_points(lifted.gaussians.means[like])[:, 2]
+    world = camera.unproject(xy, depth)
+    axes = lifted.world_from_object[:3, :3] / lifted.scale
+    facing = -world @ axes / np.linalg.norm(world, axis=1, keepdims=True)
+    own = lifted.gaussians
+    hair = Gaussians(
+        lifted.object_points(world).astype(np.float32), quats_along(facing).astype(np.float32),
+        own.scales[like] * np.array([1, 1, FLAT], np.float32),
+        np.full(len(xy), HAIR, np.float32), own.colors[like],
+    )  # fmt: skip
+    seen = np.ones(len(xy), np.float32)
+    return appended(lifted, hair, PhotoTexture(np.asarray(xy, np.float32), seen, seen), like)
