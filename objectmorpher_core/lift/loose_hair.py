@@ -173,7 +173,7 @@ def _around(image: np.ndarray, sigma: float) -> F32:
 
 MARGIN = 2.5  # x the matte's band
 CONTEXT = 8  # x margin, seen around it
-BEHIND = (0.3, 0.7, 1.4)  # x margin, standard deviations over which what is behind is averaged
+BEHIND = (0.5, 1.2, 2.5)  # x margin: so far around, what is behind is averaged, the nearest first
 MORE = 1.25  # x the least that it can cover
 FAINTEST = 0.02  # alpha that is kept
 
@@ -213,10 +213,11 @@ def _unmixed(
     is_bare = ~covered[part] & (cv2.dilate(there.astype(np.uint8), disc(2)) == 0)
     bare, total = is_bare.astype(np.float32), np.full(there.shape, 1e-9, np.float32)
     behind = np.zeros_like(rgb)
+    shown = rgb * bare[..., None]
     for n, size in enumerate(BEHIND):
-        blur, share = ((0, 0), size * margin), np.float32(100.0**-n)
-        total += share * cv2.GaussianBlur(bare, *blur)
-        behind += share * np.asarray(cv2.GaussianBlur(rgb * bare[..., None], *blur), np.float32)
+        side, share = 2 * int(np.ceil(size * margin)) + 1, np.float32(100.0**-n)
+        total += share * cv2.blur(bare, (side, side))
+        behind += share * cv2.blur(shown, (side, side))
     behind /= total[..., None]
     change = (rgb - behind) * there[..., None]
     room = np.maximum(np.where(change > 0, 1 - behind, behind), 1e-3)
