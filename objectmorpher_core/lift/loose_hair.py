@@ -16,7 +16,7 @@ from functools import cache
 import cv2
 import numpy as np
 from scipy.ndimage import map_coordinates
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from ..base.arrays import F32, U8, Mask, Pixels, crop, unit_pixels
 from ..base.camera import Camera
@@ -254,7 +254,7 @@ def with_hair_along(
     xy += pitch * np.random.default_rng(seed).uniform(0, UNEVEN, xy.shape)
     x, y = np.minimum(xy.astype(int), [width - 1, height - 1]).T
     xy = xy[near[y, x] > 0] + [whole.left, whole.top]
-    like = edge[cKDTree(lifted.texture.u0[edge]).query(xy)[1]]
+    like = edge[KDTree(lifted.texture.u0[edge]).query(xy)[1]]
     depth = lifted.world_points(lifted.gaussians.means[like])[:, 2]
     world = camera.unproject(xy, depth)
     axes = lifted.world_from_object[:3, :3] / lifted.scale

@@ -137,7 +137,9 @@ class _Growth:
     def grown(self, rng: np.random.Generator) -> LiftedObject:
         """The object with its strands after its Gaussians."""
         count, seen = len(self.roots), self.lifted.texture
-        texture = PhotoTexture(seen.u0[self.roots], np.zeros(count), np.ones(count))
+        texture = PhotoTexture(
+            seen.u0[self.roots], np.zeros(count, np.float32), np.ones(count, np.float32)
+        )
         return appended(self.lifted, self._strands(rng), texture, self.roots)
 
     def _strands(self, rng: np.random.Generator) -> Gaussians:
