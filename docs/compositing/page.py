@@ -172,6 +172,25 @@ minds texture and outlines more): a smooth blur is near and unlike, a sharp gues
 
 {summary}
 
+What is filled in comes, since this table was made, from the regions beside the hole: ground
+goes on as ground, and a house as a house. Sources of another kind, by colour and roughness,
+cost 4,000 squared levels at most. Of 40 holes in the form of objects, cut where nothing stands,
+19 were chosen on and 21 held out. Of what is filled in there, the share that looks like another
+region than what was there falls from 30 to 27 %, of those held out from 34 to 29 %; PSNR rises
+from 18.7 to 19.2 dB and from 18.3 to 18.5, of the same blurred by 6 px from 22.2 to 23.0 and
+from 21.9 to 22.5. Gravel alone, of one kind throughout, comes out 2 % smoother. A wide hole
+between two regions still gets a boundary that wanders.
+
+Where a thing meets the ground no light falls, and a fill from there is as dark: below a sports
+car it became a hole with the windows of a house. A strip far darker than the ground below it
+(0.45 of its light), which ends within 0.18 of the thing's shorter side and is as wide as a
+third of its foot, is filled in with the thing, when that has left its place. Its four numbers
+were chosen on 50 photographs, of which six have such a strip; one of the six is a dark tray
+under a vase. Of 30 others four do, two cars and two shoes, and all four are strips. In one of
+56 made scenes on which nothing was chosen, and in which the thing throws no shadow, something
+else is taken for a strip. A foot that curves upwards at its sides, such as a lamp's on its edge, has none
+that is found.
+
 Holes in photos that none of the above are of (PSNR, SSIM, HED):
 
 {others}

@@ -23,6 +23,7 @@ from ...base.camera import Camera
 from ...base.masks import box_of, disc
 from ...document.model import Document, EditObject, Matte, Placement, Plate
 from ...document.placement import is_in_place
+from ...document.settings import GAMMA
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
@@ -69,7 +70,85 @@ def find_residue(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     wide = cv2.dilate(residue.astype(np.uint8), np.ones((3, 3), np.uint8))
     large = cv2.resize(wide, own.shape[::-1], interpolation=cv2.INTER_NEAREST)
     found[window] = (large > 0) & ~own
+    count, things, stats, _ = cv2.connectedComponentsWithStats(covered.view(np.uint8))
+    for k in range(1, count):
+        if stats[k, cv2.CC_STAT_AREA] > LEAST_THING**2:
+            x, y, w, h = (int(n) for n in stats[k, :4])
+            found |= unlit_strip(pixels, np.asarray(things, np.int32) == k, (x, y, x + w, y + h))
+    return found & ~covered
+
+
+# Where a thing meets the ground no light falls: a fill from there would be as dark. That strip is
+# far darker than the ground below it, ends soon, and is as wide as a good part of the foot.
+
+LEAST_THING = 40.0  # px, root of the area of a thing whose contact with the ground is looked at
+DEEP = 0.18  # x a thing's shorter side: how far below it the strip ends
+FOOT = 0.35  # x its height: where it may stand
+UNLIT = 0.45  # x the ground's light
+WIDE, GOES_ON = 0.3, 0.25  # x the foot's width; of the strip's columns, that may reach farther
+CONTACT_SIDE = 300.0  # px: size of the picture in which it is looked for
+
+
+def unlit_strip(pixels: Pixels, thing: Mask, box: Box) -> Mask:
+    """(H, W) the strip without light below a `thing` (H, W) of the photo, which fills a `box`."""
+    found, (x0, y0, x1, y1) = np.zeros_like(thing), box
+    deep = DEEP * min(x1 - x0, y1 - y0)
+    reach = round(deep)
+    window = np.s_[y0 : y1 + 3 * reach, max(x0 - reach, 0) : x1 + reach]
+    part, own = pixels[window], thing[window]
+    scale = min(1.0, CONTACT_SIDE / max(own.shape))
+    size = (max(round(own.shape[1] * scale), 1), max(round(own.shape[0] * scale), 1))
+    small = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
+    small = np.divide(small, np.iinfo(pixels.dtype).max, dtype=np.float32)
+    light = np.asarray((small**GAMMA).mean(-1), np.float32)
+    covered = cv2.resize(own.view(np.uint8) * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 0
+    strip = _unlit(light, covered, max(round(deep * scale), 3))
+    wide = cv2.dilate(strip.astype(np.uint8), disc(2))
+    large = cv2.resize(wide, own.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    found[window] = large > 0
     return found
+
+
+def _unlit(light: F32, covered: Mask, deep: int) -> Mask:
+    """(h, w) the strip of little `light` (h, w) up to `deep` px below what is `covered` (h, w)."""
+    rows = np.arange(len(light))[:, None]
+    above = np.maximum.accumulate(np.where(covered, rows, -len(light)), axis=0)
+    lowest, strip = above[-1], np.zeros_like(covered)
+    if (ground := _ground_light(light, covered, lowest, deep)) is None:
+        return strip
+    foot = lowest.max() - FOOT * (lowest.max() - np.argmax(covered.any(1)))
+    dark = ~covered & (rows - above <= deep) & (light < UNLIT * ground)
+    dark = cv2.morphologyEx(dark.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(dark, connectivity=8)
+    touched = cv2.dilate(covered.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    least = WIDE * np.count_nonzero(lowest >= foot)
+    for k in range(1, count):
+        piece, width = np.asarray(labels, np.int32) == k, stats[k, cv2.CC_STAT_WIDTH]
+        goes_on = np.count_nonzero(piece & (rows - above >= deep - 1))
+        if width >= least and goes_on <= GOES_ON * width and (piece & touched).any():
+            strip |= piece & (rows >= foot)
+    return strip
+
+
+def _ground_light(light: F32, covered: Mask, lowest: I64, deep: int) -> F32 | None:
+    """(w,) the usual `light` (h, w) of the ground in each column, or None.
+
+    It is measured from `deep` to three times as many px below the `lowest` row (w,) of what is
+    `covered` (h, w), which is negative in a column where nothing is.
+    """
+    ground = np.full(len(lowest), np.nan, np.float32)
+    for k in range(len(lowest)):
+        near = slice(max(k - deep, 0), k + deep + 1)
+        if len(around := lowest[near][lowest[near] >= 0]):
+            first = int(np.median(around)) + deep
+            part = np.s_[first : first + 2 * deep, near]
+            if np.count_nonzero(~covered[part]) > LEAST:
+                ground[k] = np.median(light[part][~covered[part]])
+    known = np.flatnonzero(np.isfinite(ground))
+    if not len(known):
+        return None
+    whole = np.interp(np.arange(len(ground)), known, ground[known]).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(whole[None], (0, 0), deep)[0], np.float32)
 
 
 class _Surroundings:

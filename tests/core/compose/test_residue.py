@@ -13,6 +13,7 @@ from skimage import data
 from objectmorpher.canvas.derived import Derived
 from objectmorpher_core import compose
 from objectmorpher_core.base.arrays import F32, Mask, Pixels, crop
+from objectmorpher_core.base.masks import box_of
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.order import holes
 from objectmorpher_core.compose.plate import plate as plates
@@ -25,7 +26,12 @@ from objectmorpher_core.compose.plate.plate import (
     plate_crop,
     plate_of_holes,
 )
-from objectmorpher_core.compose.plate.residue import find_ghosts, left_out, with_parts
+from objectmorpher_core.compose.plate.residue import (
+    find_ghosts,
+    left_out,
+    unlit_strip,
+    with_parts,
+)
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import (
     Click,
@@ -39,6 +45,7 @@ from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import cut_out
 from tests.photos import outlined, photo
+from tests.shadow_scenes import scene
 from tests.shapes import camera, png
 from tests.tree import quick
 
@@ -130,11 +137,70 @@ def test_beside_a_good_selection_hardly_anything_is_replaced(name, source, groun
     assert needless.sum() < 0.06 * covered.sum()
 
 
+def _strip(own: Mask) -> Mask:
+    """Where a thing stands and no light falls: below most of its foot, a fifteenth of it high."""
+    rows, columns = np.flatnonzero(own.any(1)), np.flatnonzero(own.any(0))
+    strip = np.zeros(own.shape, np.uint8)
+    middle, half = int(columns.mean()), (int(0.4 * len(columns)), int(0.07 * len(rows)))
+    cv2.ellipse(strip, (middle, int(rows[-1])), half, 0, 0, 360, (1,), -1)
+    return (strip > 0) & ~own
+
+
+@pytest.mark.parametrize(("name", "source", "ground"), [SCENES[1], ("patch", "astronaut", "wood")])
+def test_the_strip_without_light_below_a_thing_is_gone_where_it_stood(name, source, ground):
+    """It is no source either: the fill is as light as the ground."""
+    pixels, behind, own = _scene(name, source, ground)
+    dark, strip = pixels.copy(), _strip(own)
+    dark[strip] //= 5
+    covered = _away(own) < 3
+    seen = strip & (_away(covered) > SEAM * MARGIN)
+    assert seen.sum() > 0.01 * own.sum()
+    plates = [build_plate(p, covered, compose.load("patchmatch")) for p in (pixels, dark)]
+    bright, picture = (
+        plate_crop(p, plate, (0, 0, WIDTH, HEIGHT)).astype(float)
+        for p, plate in zip((pixels, dark), plates, strict=True)
+    )
+    left = np.abs(picture - behind).mean(-1)[seen].mean()
+    assert left < 0.3 * np.abs(dark.astype(float) - behind).mean(-1)[seen].mean()
+    assert picture[own].mean() > 0.9 * bright[own].mean()
+
+
+def test_it_stays_below_a_thing_that_turns_in_its_place():
+    pixels, _, own = _scene(*SCENES[1])
+    pixels = pixels.copy()
+    strip = _strip(own)
+    pixels[strip] //= 5
+    document = _lifted(pixels, own)
+    assert document.plate is not None
+    hole = crop(document.plate.hole, document.plate.box, (0, 0, WIDTH, HEIGHT))
+    foot = strip & (_away(own) > 2 * MARGIN)
+    assert hole[foot].mean() > 0.9, "it is filled in"
+    turned = edits.set_placement(document, 0, Placement(turn=(8.0, 0.0, 0.0)))
+    assert (composite(turned).pixels[foot] == pixels[foot]).all(-1).mean() > 0.9
+
+
+@pytest.mark.slow
+def test_what_is_dark_on_a_ground_is_no_strip_without_light():
+    """On made scenes in which a thing throws no shadow, and on which nothing was chosen."""
+    scenes = [made for seed in range(1, 60, 2) if not (made := scene(seed)).has_shadow]
+    found = 0
+    for made in scenes:
+        covered = cv2.dilate(made.mask.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        strip = unlit_strip(made.photo, covered, box_of(covered))
+        found += bool((strip & ~covered).any())
+    assert len(scenes) > 10 and found <= 1
+
+
 @pytest.fixture(scope="module")
 def footless() -> Document:
     """A lifted patch whose lower end was left out."""
     pixels, _, own = _scene("patch", "astronaut", "street")
-    view, mask = camera(WIDTH, HEIGHT), _missing(own, "foot")
+    return _lifted(pixels, _missing(own, "foot"))
+
+
+def _lifted(pixels: Pixels, mask: Mask) -> Document:
+    """A document whose one object is what a mask covers, with a background behind it."""
+    view = camera(WIDTH, HEIGHT)
     document = Document(Photo(Picture(pixels), view, png(pixels), "patch.png"))
     document = edits.set_mask(edits.add_object(document), 0, mask, Prompt())
     document = edits.set_lifted(document, 0, *lift_mask(pixels, view, mask, "relief"))
