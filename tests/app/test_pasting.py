@@ -116,6 +116,11 @@ def test_paste_brings_in_what_was_copied_last(
         wait_until(editor, lambda n=count: len(editor.opened.objects) == n)
         wait_for_jobs(editor)
     assert editor.opened.objects[1].is_visitor and len(editor.tabs.all) == 2
+    for _ in range(2):  # in a moment
+        run(editor, "paste")
+    wait_until(editor, lambda: len(editor.opened.objects) == 4)
+    wait_for_jobs(editor)
+    assert len({item.name for item in editor.opened.objects}) == 4
     run(editor, "copy")
     wait_for_jobs(editor)
     wait_until(editor, lambda: not editor.chores.is_busy(COPY))
