@@ -15,7 +15,7 @@ from ...commands import next_step, run, take_next_step
 from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.shortcuts import Shortcuts
-from ...editor.view import CHANGING, Hover, ToolName
+from ...editor.view import Hover, ToolName
 from ...system.texts import t
 from ...tools import navigate
 from ...tools.pointer import Button, Pointer, PointerShape
@@ -290,9 +290,8 @@ class Input:
     def hint(self, editor: Editor) -> str:
         if editor.document is None:
             return t("Open a photo, drop one here, or try a sample")
-        own = editor.object
-        if own is not None and _is_held(editor) and editor.hover.other is None:
-            return t("{name} is locked", name=own.name)
+        if _is_held(editor) and editor.hover.other is None:
+            return editor.why_held or ""
         return TOOLS[editor.view.tool].hint(editor)
 
     def take_key(self, keys: str) -> None:
@@ -474,10 +473,7 @@ def _is_locked(editor: Editor, pointer: Pointer) -> bool:
 
 def _is_held(editor: Editor) -> bool:
     """Whether the tool would change the current object, which is locked, or not seen to move."""
-    own, tool = editor.object, editor.view.tool
-    if own is None or tool not in CHANGING or tool is ToolName.SELECT:
-        return False
-    return own.is_locked or (not own.is_visible and tool is not ToolName.MASK)
+    return editor.view.tool is not ToolName.SELECT and editor.why_held is not None
 
 
 def _hover(tool: Tool, editor: Editor, pointer: Pointer) -> PointerShape:
