@@ -302,6 +302,22 @@ def test_what_would_be_hidden_comes_in_front(editor: Editor, ball: Document) -> 
     wait_for_jobs(editor)
 
 
+def test_it_is_not_copied_into_a_tab_without_a_photo_which_is_said(
+    editor: Editor, ball: Document
+) -> None:
+    editor.tabs.open(ball)
+    run(editor, "new_tab")
+    first, empty = editor.tabs.all
+    editor.tabs.go(first)
+    wait_until(editor, lambda: editor.tab is first)
+    assert editor.objects.carry(0, has_tabs=True)
+    editor.pasting.carry(empty)
+    assert editor.message is not None and "No photo is open in that tab" in editor.message.text
+    assert editor.tab is first and editor.committed is ball and editor.objects.carried is None
+    close_all(editor)
+    wait_for_jobs(editor)
+
+
 def test_in_its_own_photo_it_is_a_copy(editor: Editor, ball: Document) -> None:
     editor.tabs.open(ball)
     run(editor, "copy_object")

@@ -428,11 +428,16 @@ class Pasting:
         self._start(build, accept)
 
     def carry(self, tab: Tab) -> None:
-        """Copies the current object, or that of the carried row, into another tab; shows that."""
+        """Copies the current object, or that of the carried row, into another tab; shows that.
+
+        Into one without a photo nothing can be copied, which is said.
+        """
         k, self._objects.carried = self._objects.carried, None
         if k is not None:
             self._objects.choose(k)
-        if tab.document is not None and self._editor.is_lifted:
+        if tab.document is None:
+            self._editor.say(t("No photo is open in that tab · Open one there first"))
+        elif self._editor.is_lifted:
             self.copy()
             self._picture = b""
             self._tabs.go(tab, self.paste)
