@@ -120,6 +120,16 @@ class KeyboardFocus:
         imgui.set_nav_cursor_visible(True)
 
 
+def _is_in_step() -> bool:
+    """Whether the button that is held now is the one that is held in ImGui's frame.
+
+    While a frame was slow it may have gone up, and down again elsewhere: for another stroke.
+    """
+    queue = imgui.get_current_context().input_events_queue
+    kind = imgui.internal.InputEventType.mouse_button
+    return any(imgui.get_io().mouse_down) and all(event.type != kind for event in queue)
+
+
 def is_for_controls(keys: str) -> bool:
     """Whether a panel that has the keys needs this chord for itself."""
     return keys.rpartition("+")[2] in (
@@ -248,7 +258,7 @@ class Input:
         """
         io = imgui.get_io()
         has_mouse = imgui.is_mouse_pos_valid()  # else it has left, and is at minus 3e38
-        if at is not None:
+        if at is not None and _is_in_step():
             self.mouse = at
         elif has_mouse:
             self.mouse = io.mouse_pos.x, io.mouse_pos.y
