@@ -26,6 +26,7 @@ from ..worker.job_functions import WARM
 from ..worker.jobs import Jobs
 from ..worker.requests import LIFT, READY, Chores, JobError
 from .autosave import Autosave
+from .export_plan import What
 from .history import History, Step
 from .settings import Settings
 from .view import CHANGING, MOVING, Action, Hover, StatusMessage, ViewState
@@ -51,7 +52,7 @@ class Tab:
     is_lifting: bool = False  # a lift was stopped when the tab was left
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
-    exported: str = ""  # what of it was exported last, see `export_plan.py`
+    exported: frozenset[What] = frozenset()  # what of it was exported
     writing: Step | None = None  # which a session's file is to hold, that is not written yet
     autosave: Autosave = field(init=False)
 
