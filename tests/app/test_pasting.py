@@ -121,6 +121,11 @@ def test_paste_brings_in_what_was_copied_last(
     wait_until(editor, lambda: len(editor.opened.objects) == 4)
     wait_for_jobs(editor)
     assert len({item.name for item in editor.opened.objects}) == 4
+    run(editor, "copy_object")
+    editor.say("newer")
+    wait_for_jobs(editor)
+    wait_until(editor, lambda: not editor.chores.is_busy(COPY))
+    assert editor.message is not None and editor.message.text == "newer", "not of the copy"
     run(editor, "copy")
     wait_for_jobs(editor)
     wait_until(editor, lambda: not editor.chores.is_busy(COPY))

@@ -152,8 +152,9 @@ def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
         assert video.size == (WIDTH, HEIGHT)
         assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(video)) == 1000  # ms
     moved.apply("Move object", edits.set_placement(ball, 0, Placement()))
-    exporting.open()  # as it was last, but for what cannot be shown
-    assert exporting.draft is not None and exporting.draft.what is What.VIDEO
+    exporting.open()  # a video as it was last, but for what cannot be shown
+    exporting.choose_what(What.VIDEO)
+    assert exporting.draft is not None
     assert exporting.draft.motion is VideoMotion.SWAY and exporting.draft.seconds == 1.0
     exporting.choose_motion(VideoMotion.MORPH)
     assert exporting.problem == "Move or pose an object first"

@@ -61,8 +61,10 @@ def test_a_hidden_one_is_not_moved_unseen(locked: Editor) -> None:
         editor.view.tool = tool
         is_moving = tool in (ToolName.POSE, ToolName.PLACE)
         assert editor.why_held == (hidden if is_moving else None)
+    editor.objects.say_hidden(1)
     editor.objects.toggle_visible(1)
     assert why_not(editor, "reset_place") is None
+    assert editor.message is None, "its button would hide it again"
 
 
 def test_it_cannot_be_pointed_at_and_the_others_can_be_changed(locked: Editor) -> None:

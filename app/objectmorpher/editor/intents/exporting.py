@@ -332,16 +332,20 @@ class Exporting:
         editor, document = self._editor, self._editor.committed
         if document is None:
             return
-        plan = ExportPlan(what, Path("copied.png"), editor.current, bits=8)
+        plan, before = ExportPlan(what, Path("copied.png"), editor.current, bits=8), editor.message
         told = t("Copied the photo")
         if what is What.CUTOUT:
             told = t("Copied {name} · Ctrl+Shift+C copies the photo", name=editor.chosen.name)
+
+        def tell() -> None:
+            if editor.message is None or editor.message is before:  # else newer is said, of a paste
+                editor.say(told)
 
         def offer(png: bytes) -> None:
             offered(png)
             editor.chores.start(
                 t("Copying"), lambda progress: clipboard.copy(png), kind=COPY,
-                done=lambda _: editor.say(told), failed=editor.complain_of,
+                done=lambda _: tell(), failed=editor.complain_of,
             )  # fmt: skip
 
         editor.jobs.start(

@@ -20,7 +20,7 @@ from ...system import clipboard
 from ...system.texts import t
 from ...worker.requests import LIFT, JobError
 from ..tasks import SELECT
-from ..view import USUAL_LEVEL, Action, ToolName
+from ..view import USUAL_LEVEL, Action, StatusMessage, ToolName
 from .composing import USUAL_SHADOW
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ class Objects:
         self._posing = posing
         self.renaming: int | None = None  # whose name is being typed
         self.carried: int | None = None  # whose row is being dragged up or down the list
+        self._hidden: StatusMessage | None = None  # that one is hidden, as it was said last
 
     def start_another(self) -> None:
         """The next click selects another object."""
@@ -94,12 +95,15 @@ class Objects:
             is_visible = not editor.document.objects[k].is_visible
             label = t("Show object") if is_visible else t("Hide object")
             editor.apply(label, edits.set_visible(editor.document, k, is_visible))
+            if editor.message is self._hidden:
+                editor.message = None
 
     def say_hidden(self, k: int) -> None:
         """That object `k` is hidden, with a button that shows it."""
         name = self._editor.opened.objects[k].name
         action = Action(t("Show object"), lambda: self.toggle_visible(k))
         self._editor.say(t("{name} is hidden", name=name), action)
+        self._hidden = self._editor.message
 
     def forget_lost(self) -> None:
         """After a step back: another object is current where the current one is not there."""
