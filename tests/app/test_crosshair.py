@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 from imgui_bundle import imgui
@@ -14,6 +17,23 @@ from objectmorpher.gui.widgets.panes import Rect
 from objectmorpher.gui.window.input import Input
 from objectmorpher.tools.pose_tool import DEPTH_STEP
 from objectmorpher_core.document.model import Document
+
+
+@contextmanager
+def held_ball(editor: Editor, ball: Document) -> Iterator[tuple[imgui.IO, np.ndarray, Rect]]:
+    """ImGui without a window, a place on the ball that Place moves, and the canvas."""
+    editor.start(ball)
+    editor.view.tool = ToolName.PLACE
+    imgui.create_context()
+    try:
+        io = imgui.get_io()
+        io.set_ini_filename("")
+        io.display_size = imgui.ImVec2(editor.view.width, editor.view.height)
+        io.backend_flags |= imgui.BackendFlags_.renderer_has_textures.value
+        middle = editor.view.canvas_from_image(np.array([90.0, 60.0]))
+        yield io, middle, Rect(0.0, 0.0, editor.view.width, editor.view.height)
+    finally:
+        imgui.destroy_context()
 
 
 @pytest.fixture
@@ -101,16 +121,7 @@ def test_a_stroke_goes_on_from_where_the_mouse_left_the_window(
     keys: Input, editor: Editor, ball: Document
 ) -> None:
     """ImGui then says that it is at minus 3e38, of which a tool makes numbers that are none."""
-    editor.start(ball)
-    editor.view.tool = ToolName.PLACE
-    imgui.create_context()
-    try:
-        io = imgui.get_io()
-        io.set_ini_filename("")
-        io.display_size = imgui.ImVec2(editor.view.width, editor.view.height)
-        io.backend_flags |= imgui.BackendFlags_.renderer_has_textures.value
-        middle = editor.view.canvas_from_image(np.array([90.0, 60.0]))
-        rect = Rect(0.0, 0.0, editor.view.width, editor.view.height)
+    with held_ball(editor, ball) as (io, middle, rect):
         for place in (middle, middle + 1, middle + 40, np.full(2, -float(np.finfo("f4").max))):
             io.add_mouse_pos_event(*place)
             io.add_mouse_button_event(0, place is not middle)
@@ -123,5 +134,30 @@ def test_a_stroke_goes_on_from_where_the_mouse_left_the_window(
         assert editor.hand.is_busy
         assert before is not None and before.move[0] > 5
         assert editor.placing.placement == before
-    finally:
-        imgui.destroy_context()
+
+
+def test_a_stroke_ends_where_its_button_went_up_also_where_it_is_down_again(
+    keys: Input, editor: Editor, ball: Document
+) -> None:
+    """In one slow frame a drag ends, and another press comes elsewhere: the mouse is there now."""
+    with held_ball(editor, ball) as (io, middle, rect):
+
+        def draw(at: np.ndarray | None = None) -> None:
+            imgui.new_frame()
+            keys.update(editor, rect, 1.0, None if at is None else (float(at[0]), float(at[1])))
+            imgui.end_frame()
+
+        io.add_mouse_pos_event(*middle)
+        draw()
+        io.add_mouse_button_event(0, True)
+        draw()
+        end, other = np.floor(middle + 40), np.full(2, 3.0)
+        io.add_mouse_pos_event(*end)
+        draw(end)
+        for is_down, place in ((False, end), (True, other)):
+            io.add_mouse_pos_event(*place)
+            io.add_mouse_button_event(0, is_down)
+        before = editor.placing.placement
+        while len(imgui.get_current_context().input_events_queue):
+            draw(other)
+        assert editor.placing.placement == before and before is not None and before.move[0] > 5

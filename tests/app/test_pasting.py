@@ -116,6 +116,16 @@ def test_paste_brings_in_what_was_copied_last(
         wait_until(editor, lambda n=count: len(editor.opened.objects) == n)
         wait_for_jobs(editor)
     assert editor.opened.objects[1].is_visitor and len(editor.tabs.all) == 2
+    for _ in range(2):  # in a moment
+        run(editor, "paste")
+    wait_until(editor, lambda: len(editor.opened.objects) == 4)
+    wait_for_jobs(editor)
+    assert len({item.name for item in editor.opened.objects}) == 4
+    run(editor, "copy_object")
+    editor.say("newer")
+    wait_for_jobs(editor)
+    wait_until(editor, lambda: not editor.chores.is_busy(COPY))
+    assert editor.message is not None and editor.message.text == "newer", "not of the copy"
     run(editor, "copy")
     wait_for_jobs(editor)
     wait_until(editor, lambda: not editor.chores.is_busy(COPY))
@@ -293,6 +303,22 @@ def test_what_would_be_hidden_comes_in_front(editor: Editor, ball: Document) -> 
     seen = (composite(document).pixels != ball.photo.pixels).any(-1)
     assert seen.mean() > 0.02
     assert document.objects[0] is ball.objects[0]
+    close_all(editor)
+    wait_for_jobs(editor)
+
+
+def test_it_is_not_copied_into_a_tab_without_a_photo_which_is_said(
+    editor: Editor, ball: Document
+) -> None:
+    editor.tabs.open(ball)
+    run(editor, "new_tab")
+    first, empty = editor.tabs.all
+    editor.tabs.go(first)
+    wait_until(editor, lambda: editor.tab is first)
+    assert editor.objects.carry(0, has_tabs=True)
+    editor.pasting.carry(empty)
+    assert editor.message is not None and "No photo is open in that tab" in editor.message.text
+    assert editor.tab is first and editor.committed is ball and editor.objects.carried is None
     close_all(editor)
     wait_for_jobs(editor)
 

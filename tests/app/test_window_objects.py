@@ -82,12 +82,18 @@ def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
     assert second.placement.move == (50.0, 0.0)
 
 
-def test_a_row_let_go_on_a_tab_is_copied_there_and_a_key_pose_moves_no_button(
+def test_a_row_let_go_on_a_tab_is_copied_there_and_a_key_pose_hides_no_button(
     without_networks: dict[str, str], ball: Document, photo_path: Path, tmp_path: Path
 ) -> None:
     session = tmp_path / "balls.omorph"
-    save_session(ball, session)
+    save_session(edits.duplicate(ball, 0), session)
     with opened(without_networks, session, str(photo_path)) as hands:
+        hands.press("ctrl+t")
+        hands.area("Tab: New tab")
+        hands.choose("Tab: balls.omorph")
+        hands.drag(hands.place("row of Object 1"), hands.place("Tab: New tab"))
+        hands.settle()
+        assert rows(hands) == ["Object 1 copy", "Object 1"] and "edited" not in hands.title()
         hands.drag(hands.place("row of Object 1"), hands.place("Tab: ball.png"))
         hands.wait(lambda: "ball.png — edited" in hands.title(), "copying into the tab")
         hands.settle()
@@ -101,6 +107,8 @@ def test_a_row_let_go_on_a_tab_is_copied_there_and_a_key_pose_moves_no_button(
         hands.area("Go to key pose 1")
         hands.settle()
         assert hands.area("Add key pose") == before
+        hands.xdotool("mousemove", *(round(v) for v in hands.place("Go to key pose 1")))
+        assert hands.area("Tooltip")[2] <= hands.area("Add key pose")[0], "beside all buttons"
 
 
 def test_a_locked_object_has_no_frame_to_take_hold_of(
@@ -133,7 +141,8 @@ def test_a_hidden_object_is_not_moved_unseen(
         hands.choose("row of Object 1 copy")
         hands.press("4")
         hands.catch_up()
-        assert "Ring: yaw" not in hands.places()
+        assert "Ring: yaw" not in hands.places() and "Right" not in hands.places()
+        hands.area("Object 1 copy is hidden")
         hands.press("Right")
         there = hands.on_photo(CENTRE[0] + 60.0, CENTRE[1], size)
         hands.drag(there, hands.on_photo(CENTRE[0] + 70.0, CENTRE[1] - 20.0, size))
@@ -142,3 +151,4 @@ def test_a_hidden_object_is_not_moved_unseen(
         assert "edited" not in hands.title()
         hands.choose("Show object")
         hands.area("Ring: yaw")
+        hands.area("Right")

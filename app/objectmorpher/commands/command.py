@@ -37,8 +37,11 @@ no_selection = unless(
     lambda e: e.mask is not None, lambda e: t("Click an object in the photo first"), no_photo
 )
 no_lift = unless(lambda e: e.is_lifted, lambda e: e.why_no_shape, no_photo)
+no_sight = unless(  # of what a command would move
+    lambda e: e.chosen.is_visible, lambda e: t("{name} is hidden", name=e.chosen.name), no_lift
+)
 no_handle = unless(
-    lambda e: e.posing.handle is not None, lambda e: t("Select a handle first"), no_lift
+    lambda e: e.posing.handle is not None, lambda e: t("Select a handle first"), no_sight
 )
 
 

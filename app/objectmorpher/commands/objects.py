@@ -20,6 +20,7 @@ from .command import (
     no_lift,
     no_photo,
     no_selection,
+    no_sight,
     unless,
 )
 
@@ -93,7 +94,7 @@ def _where_it_was(editor: Editor) -> str:
 def _reset(part: Callable[[Placement], object], reason: Callable[[Editor], str]) -> Reason:
     """The reason why a part of the placement that is as it was already cannot be reset."""
     return unless(
-        lambda e: (p := e.placing.placement) and part(p) != part(e.placing.home), reason, no_lift
+        lambda e: (p := e.placing.placement) and part(p) != part(e.placing.home), reason, no_sight
     )
 
 
@@ -102,7 +103,7 @@ _not_shifted = _reset(lambda place: (*place.move, place.depth), _where_it_was)
 _not_turned = unless(
     lambda e: (p := e.placing.placement) and any(p.turn),
     lambda e: t("The object is not turned"),
-    no_lift,
+    no_sight,
 )
 _not_sized = _reset(lambda place: place.scale, lambda e: t("The object has its own size"))
 
@@ -211,7 +212,7 @@ SELECT_COMMANDS: dict[str, Command] = {
 _no_handles = unless(
     lambda e: e.object is not None and e.object.handles,
     lambda e: t("There is no handle yet"),
-    no_lift,
+    no_sight,
 )
 _no_place_for_a_pin = unless(
     lambda e: e.hover.surface is not None or e.hover.handle is not None,
@@ -226,7 +227,7 @@ _nothing_to_replace = unless(
 
 def _no_pose(editor: Editor) -> str | None:
     is_posed = editor.object is not None and editor.object.pose is not None
-    return None if is_posed else _no_handles(editor)
+    return no_sight(editor) if is_posed else _no_handles(editor)
 
 
 def _toggle_ring(editor: Editor) -> None:

@@ -26,9 +26,10 @@ from ..worker.job_functions import WARM
 from ..worker.jobs import Jobs
 from ..worker.requests import LIFT, READY, Chores, JobError
 from .autosave import Autosave
+from .export_plan import What
 from .history import History, Step
 from .settings import Settings
-from .view import Action, Hover, StatusMessage, ViewState
+from .view import CHANGING, MOVING, Action, Hover, StatusMessage, ViewState
 
 # A photo or session that is open: its document and steps, its files, and how it was looked at.
 
@@ -51,7 +52,7 @@ class Tab:
     is_lifting: bool = False  # a lift was stopped when the tab was left
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
-    exported: str = ""  # what of it was exported last, see `export_plan.py`
+    exported: frozenset[What] = frozenset()  # what of it was exported
     writing: Step | None = None  # which a session's file is to hold, that is not written yet
     autosave: Autosave = field(init=False)
 
@@ -286,6 +287,16 @@ class EditorState:
             has_moved = t("{name} was here and has moved", name=item.name)
             is_hidden = t("{name} was here and is hidden", name=item.name)
             self.say(has_moved if item.is_visible else is_hidden)
+
+    @property
+    def why_held(self) -> str | None:
+        """Why the tool leaves the current object as it is, or None: nor is one moved unseen."""
+        own, tool = self.object, self.view.tool
+        if own is not None and own.is_locked and tool in CHANGING:
+            return t("{name} is locked", name=own.name)
+        if own is not None and not own.is_visible and tool in MOVING:
+            return t("{name} is hidden", name=own.name)
+        return None
 
     def say_locked(self, k: int) -> None:
         """That object `k` is locked, with a button that unlocks it."""

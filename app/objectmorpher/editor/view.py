@@ -71,6 +71,7 @@ class ToolName(Enum):
 
 # Tools that change the object itself, and not only what is around it.
 CHANGING = frozenset({ToolName.SELECT, ToolName.MASK, ToolName.POSE, ToolName.PLACE})
+MOVING = frozenset({ToolName.POSE, ToolName.PLACE})
 
 USUAL_LEVEL = "object"  # what a click means, unless the artist says it
 

@@ -16,7 +16,6 @@ from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.export_plan import FORMATS, Format, VideoMotion, What
 from objectmorpher.editor.settings import Settings
-from objectmorpher.editor.state import Tab
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.pictures.image import read_picture
@@ -153,8 +152,9 @@ def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
         assert video.size == (WIDTH, HEIGHT)
         assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(video)) == 1000  # ms
     moved.apply("Move object", edits.set_placement(ball, 0, Placement()))
-    exporting.open()  # as it was last, but for what cannot be shown
-    assert exporting.draft is not None and exporting.draft.what is What.VIDEO
+    exporting.open()  # a video as it was last, but for what cannot be shown
+    exporting.choose_what(What.VIDEO)
+    assert exporting.draft is not None
     assert exporting.draft.motion is VideoMotion.SWAY and exporting.draft.seconds == 1.0
     exporting.choose_motion(VideoMotion.MORPH)
     assert exporting.problem == "Move or pose an object first"
@@ -326,17 +326,25 @@ def test_the_opened_photo_is_no_target(moved: Editor, tmp_path: Path) -> None:
 
 
 def test_the_last_choice_is_remembered(moved: Editor) -> None:
+    """The photo comes first each time, as the command says; a format only if it was chosen."""
+    exporting = moved.exporting
     export(moved, What.CUTOUT, Format.WEBP)
-    moved.exporting.open()
-    assert moved.exporting.draft is not None
-    assert moved.exporting.draft.what is What.CUTOUT
-    assert moved.exporting.draft.format is Format.WEBP
-    kept, moved.tab.exported = moved.tab.exported, "nonsense"
+    exporting.open()
+    assert exporting.draft is not None
+    assert (exporting.draft.what, exporting.draft.format) == (What.PHOTO, Format.WEBP)
+    exporting.choose_format(Format.JPEG)
+    exporting.confirm()
+    exporting.open()
+    exporting.choose_what(What.CUTOUT)  # which is no JPEG
+    assert exporting.draft.format is Format.PNG
+    exporting.confirm()
+    exporting.open()
+    assert exporting.draft.format is Format.JPEG
     moved.settings = replace(moved.settings, export_format="GIF")
-    moved.exporting.open()
-    assert (moved.exporting.draft.what, moved.exporting.draft.format) == (What.PHOTO, Format.PNG)
-    moved.exporting.close()
-    assert kept == What.CUTOUT.value and Tab().exported == "", "of another photo the photo first"
+    exporting.open()
+    assert (exporting.draft.what, exporting.draft.format) == (What.PHOTO, Format.PNG)
+    exporting.close()
+    wait_for_jobs(moved)
 
 
 def test_the_format_of_another_photo_is_not_offered_where_it_would_lose_something(

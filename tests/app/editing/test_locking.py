@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from editor_steps import CENTRE, duplicate
-from objectmorpher.commands import run
+from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.gui.window.input import _is_locked
@@ -45,6 +45,26 @@ def test_nothing_changes_it_but_its_name_and_whether_it_is_seen(locked: Editor) 
     assert (item.name, item.is_visible, item.is_locked) == ("Moon", False, True)
     again = decode_session(encode_session(editor.committed))
     assert [o.is_locked for o in again.objects] == [True, False]
+
+
+def test_a_hidden_one_is_not_moved_unseen(locked: Editor) -> None:
+    """What moves it is greyed out; its look and its outline may be changed."""
+    editor = locked
+    editor.objects.choose(1)
+    editor.view.tool = ToolName.PLACE
+    assert editor.why_held is None and why_not(editor, "reset_place") is None
+    editor.objects.toggle_visible(1)
+    hidden = f"{editor.chosen.name} is hidden"
+    for name in ("reset_place", "reset_position", "reset_pose", "reset_handles"):
+        assert why_not(editor, name) == hidden
+    for tool in ToolName:
+        editor.view.tool = tool
+        is_moving = tool in (ToolName.POSE, ToolName.PLACE)
+        assert editor.why_held == (hidden if is_moving else None)
+    editor.objects.say_hidden(1)
+    editor.objects.toggle_visible(1)
+    assert why_not(editor, "reset_place") is None
+    assert editor.message is None, "its button would hide it again"
 
 
 def test_it_cannot_be_pointed_at_and_the_others_can_be_changed(locked: Editor) -> None:

@@ -63,14 +63,9 @@ class Exporting:
     # Choosing
 
     def open(self) -> None:
-        """Begins with what was exported last of this tab, else with the photo."""
+        """Begins with the photo, which the command names, as it was written last."""
         editor, settings = self._editor, self._editor.settings
         self._replacing = None
-        what = next((w for w in What if w.value == editor.tab.exported), What.PHOTO)
-        what = what if self.why_not(what) is None else What.PHOTO
-        format = next((f for f in Format if f.value == settings.export_format), self.own_format)
-        if not editor.tab.exported and not self._is_held_by(format):
-            format = self.own_format
         file = editor.source or editor.path
         last = Path(settings.export_folder)
         is_kept = file is None and settings.export_folder and last.is_dir()
@@ -78,15 +73,15 @@ class Exporting:
         motion = self._motion(settings.export_motion)
         seconds = min(max(settings.export_seconds, LENGTHS[0]), LENGTHS[1])
         draft = Draft(
-            what, format, settings.export_bits, settings.quality, settings.webp_quality, motion,
-            seconds, folder, "",
+            What.PHOTO, self._usual_format, settings.export_bits, settings.quality,
+            settings.webp_quality, motion, seconds, folder, "",
         )  # fmt: skip
         self.draft = self._named(self._fitting(draft))
 
     def _motion(self, last: str) -> VideoMotion:
         """The way through the key poses, in the first video of a tab that has some; else `last`."""
         motion = next((m for m in VideoMotion if m.value == last), VideoMotion.MORPH)
-        is_first = self._editor.tab.exported != What.VIDEO.value
+        is_first = What.VIDEO not in self._editor.tab.exported
         if is_first and self.why_no_motion(VideoMotion.KEYS) is None:
             return VideoMotion.KEYS
         return motion if self.why_no_motion(motion) is None else VideoMotion.SWAY
@@ -337,16 +332,20 @@ class Exporting:
         editor, document = self._editor, self._editor.committed
         if document is None:
             return
-        plan = ExportPlan(what, Path("copied.png"), editor.current, bits=8)
+        plan, before = ExportPlan(what, Path("copied.png"), editor.current, bits=8), editor.message
         told = t("Copied the photo")
         if what is What.CUTOUT:
             told = t("Copied {name} · Ctrl+Shift+C copies the photo", name=editor.chosen.name)
+
+        def tell() -> None:
+            if editor.message is None or editor.message is before:  # else newer is said, of a paste
+                editor.say(told)
 
         def offer(png: bytes) -> None:
             offered(png)
             editor.chores.start(
                 t("Copying"), lambda progress: clipboard.copy(png), kind=COPY,
-                done=lambda _: editor.say(told), failed=editor.complain_of,
+                done=lambda _: tell(), failed=editor.complain_of,
             )  # fmt: skip
 
         editor.jobs.start(
@@ -380,6 +379,15 @@ class Exporting:
         document = self._editor.committed
         own = None if document is None else format_of(document.photo.name)
         return own if own is not None and own in FORMATS[What.PHOTO] else Format.PNG
+
+    @property
+    def _usual_format(self) -> Format:
+        """The one chosen last; the photo's own instead of one that would lose some of it, until
+        this photo was written so."""
+        last = self._editor.settings.export_format
+        format = next((f for f in Format if f.value == last), self.own_format)
+        is_meant = What.PHOTO in self._editor.tab.exported or self._is_held_by(format)
+        return format if is_meant else self.own_format
 
     def _is_held_by(self, format: Format) -> bool:
         """Whether a format holds the photo's bits and transparency."""
@@ -415,9 +423,10 @@ class Exporting:
     def _remember(self, draft: Draft, path: Path) -> None:
         editor = self._editor
         format = "" if draft.format is self.own_format else draft.format.value
-        if len(FORMATS[draft.what]) == 1:  # nobody chose it
+        proposed = self._fitting(replace(draft, format=self._usual_format)).format
+        if draft.what is not What.PHOTO and draft.format is proposed:  # nobody chose it
             format = editor.settings.export_format
-        editor.tab.exported = draft.what.value
+        editor.tab.exported |= {draft.what}
         editor.settings = replace(
             editor.settings, export_format=format, export_bits=draft.bits,
             quality=draft.quality, webp_quality=draft.webp_quality,

@@ -6,12 +6,11 @@ import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64
-from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document import edits, visitor_edits
 from objectmorpher_core.document.model import Document, EditObject, Photo, Placement
 
@@ -19,9 +18,9 @@ from ...canvas.layer import is_front
 from ...canvas.shape import CanvasShape, build_shape, rehearse
 from ...system import clipboard
 from ...system.texts import t
-from ...worker.requests import LIFT
+from ...worker.requests import LIFT, JobError
 from ..tasks import SELECT
-from ..view import USUAL_LEVEL, Action, ToolName
+from ..view import USUAL_LEVEL, Action, StatusMessage, ToolName
 from .composing import USUAL_SHADOW
 
 if TYPE_CHECKING:
@@ -38,6 +37,7 @@ class Objects:
         self._posing = posing
         self.renaming: int | None = None  # whose name is being typed
         self.carried: int | None = None  # whose row is being dragged up or down the list
+        self._hidden: StatusMessage | None = None  # that one is hidden, as it was said last
 
     def start_another(self) -> None:
         """The next click selects another object."""
@@ -95,12 +95,15 @@ class Objects:
             is_visible = not editor.document.objects[k].is_visible
             label = t("Show object") if is_visible else t("Hide object")
             editor.apply(label, edits.set_visible(editor.document, k, is_visible))
+            if editor.message is self._hidden:
+                editor.message = None
 
     def say_hidden(self, k: int) -> None:
         """That object `k` is hidden, with a button that shows it."""
         name = self._editor.opened.objects[k].name
         action = Action(t("Show object"), lambda: self.toggle_visible(k))
         self._editor.say(t("{name} is hidden", name=name), action)
+        self._hidden = self._editor.message
 
     def forget_lost(self) -> None:
         """After a step back: another object is current where the current one is not there."""
@@ -309,6 +312,7 @@ class Objects:
 # An object of one photo that is copied into another: kept in the program, pasted in any tab.
 
 PASTE = "paste object"  # kind of chores
+T = TypeVar("T")
 
 
 class Pasting:
@@ -319,6 +323,7 @@ class Pasting:
         self._copied: EditObject | None = None
         self._photo: weakref.ref[Photo] | None = None  # it was copied from
         self._picture: bytes | None = b""  # PNG of it in the clipboard; None: not there yet
+        self._waiting: list[tuple[Tab, Callable[[], None]]] = []  # asked for while one is pasted
 
     @property
     def has_copied(self) -> bool:
@@ -346,18 +351,48 @@ class Pasting:
 
     def paste_newest(self, paste_photo: Callable[[], None]) -> None:
         """Pastes the copied object, unless something else was copied since: then that."""
-        picture = self._picture
 
-        def is_own(progress: Progress) -> bool:
-            return picture is None or clipboard.holds(picture)
+        def look() -> None:
+            picture = self._picture
+            self._start(
+                lambda: picture is None or clipboard.holds(picture),
+                lambda is_own: self._paste() if is_own else paste_photo(),
+            )
 
-        self._editor.chores.start(
-            t("Pasting"), is_own, kind=PASTE, failed=self._editor.complain_of,
-            done=lambda is_own: self.paste() if is_own else paste_photo(),
-        )  # fmt: skip
+        self._in_turn(look)
 
     def paste(self) -> None:
         """The copied object in the photo that is shown, as one step, when it can be drawn."""
+        self._in_turn(self._paste)
+
+    def _in_turn(self, paste: Callable[[], None]) -> None:
+        """Calls it now, or after what is being pasted: Ctrl+V twice in a moment pastes twice."""
+        self._waiting.append((self._editor.tab, paste))
+        self._go_on()
+
+    def _go_on(self) -> None:
+        while self._waiting and not self._editor.chores.is_busy(PASTE):
+            tab, paste = self._waiting.pop(0)
+            if tab is self._editor.tab:
+                paste()
+
+    def _start(self, find: Callable[[], T], take: Callable[[T], None]) -> None:
+        """Finds in a thread what `take` takes. If that fails, what waits would fail, too."""
+
+        def accept(found: T) -> None:
+            take(found)
+            self._go_on()
+
+        def fail(error: JobError) -> None:
+            self._waiting.clear()
+            self._editor.complain_of(error)
+
+        self._editor.chores.start(
+            t("Pasting"), lambda progress: find(), kind=PASTE, done=accept, failed=fail,
+            cancelled=self._waiting.clear,
+        )  # fmt: skip
+
+    def _paste(self) -> None:
         from objectmorpher_core.compose.order import brought_into_sight
 
         editor, document, copied = self._editor, self._editor.committed, self._copied
@@ -394,17 +429,19 @@ class Pasting:
             self._show(there)
             editor.say(t("{name} is in this photo now · Drag it to its place", name=visitor.name))
 
-        editor.chores.start(
-            t("Pasting"), lambda progress: build(), kind=PASTE, done=accept,
-            failed=editor.complain_of,
-        )  # fmt: skip
+        self._start(build, accept)
 
     def carry(self, tab: Tab) -> None:
-        """Copies the current object, or that of the carried row, into another tab; shows that."""
+        """Copies the current object, or that of the carried row, into another tab; shows that.
+
+        Into one without a photo nothing can be copied, which is said.
+        """
         k, self._objects.carried = self._objects.carried, None
         if k is not None:
             self._objects.choose(k)
-        if tab.document is not None and self._editor.is_lifted:
+        if tab.document is None:
+            self._editor.say(t("No photo is open in that tab · Open one there first"))
+        elif self._editor.is_lifted:
             self.copy()
             self._picture = b""
             self._tabs.go(tab, self.paste)

@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from ...commands import next_step, run, why_not
 from ...editor.editor import Editor
 from ...editor.history import History, Step
-from ...editor.view import CHANGING, ToolName
+from ...editor.view import ToolName
 from ...system.texts import t
 from ..widgets.panes import INSPECTOR, Rect, edge, pane
 from ..widgets.theme import FOLDED, PRIMARY, Icon, theme
@@ -53,9 +53,12 @@ def draw_inspector(editor: Editor, rect: Rect) -> None:
         imgui.begin_child("##scroll", size, imgui.ChildFlags_.nav_flattened)
         draw_objects(editor)
         rule()
-        if editor.object is not None and editor.object.is_locked and editor.view.tool in CHANGING:
-            note(t("{name} is locked.", name=editor.object.name))
-            command_button(editor, "lock", t("Unlock"))
+        if (reason := editor.why_held) is not None:
+            note(f"{reason}.")
+            if editor.chosen.is_locked:
+                command_button(editor, "lock", t("Unlock"))
+            else:
+                command_button(editor, "hide", t("Show object"))
         else:
             _PANELS[editor.view.tool](editor)
         draw_history(editor)

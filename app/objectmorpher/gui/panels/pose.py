@@ -11,6 +11,7 @@ from objectmorpher_core.document.model import EditObject
 from objectmorpher_core.document.settings import Rigidity, rigidity_of
 
 from ...canvas.painter import shown_now
+from ...commands import why_not
 from ...editor.editor import Editor
 from ...editor.intents.posing import Numbers
 from ...editor.intents.rigging import MovedPart
@@ -327,7 +328,10 @@ def draw_timeline(editor: Editor) -> None:
     if editor.keying.count:
         _draw_stations(editor)
         command_button(editor, "replace_key", t("Replace"), half)
-        tooltip(t("The key pose that you were in last becomes what you see now"))
+        if why_not(editor, "replace_key") is None:
+            tooltip(
+                t("The key pose that you were in last becomes what you see now"), is_beside=True
+            )
         imgui.same_line()
         command_button(editor, "remove_key", t("Remove"), half)
     if editor.keying.count < 2:
@@ -348,7 +352,7 @@ def _draw_stations(editor: Editor) -> None:
             keying.show(n)
         name = t("Go to key pose {number}", number=n + 1)
         mark(name)
-        tooltip(name)
+        tooltip(name, is_beside=True)
         role = "accent" if n == shown else "hovered" if imgui.is_item_hovered() else "raised"
         at, number = ImVec2(start.x + n * step + side / 2, start.y + side / 2), str(n + 1)
         draw.add_circle_filled(at, side / 2 - theme.pt(1), theme.u32(role))

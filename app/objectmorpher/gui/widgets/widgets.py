@@ -81,17 +81,21 @@ def bold_text(size: float = 0.0) -> Iterator[None]:
     imgui.pop_font()
 
 
-def tooltip(text: str, is_above: bool = False) -> None:
+def tooltip(text: str, is_above: bool = False, is_beside: bool = False) -> None:
     """Show a tooltip over the last item after a moment, also where the item is greyed out.
 
     Where the keyboard has come to the item, it is shown at once, beside the item. `is_above`:
-    above the item, where below it would hide the next one.
+    above the item, where below it would hide the next one; `is_beside`: left of the panel, where
+    above it, too, is something to click.
     """
     flags = imgui.HoveredFlags_.allow_when_disabled | imgui.HoveredFlags_.for_tooltip
     is_reached = imgui.is_item_focused() and imgui.get_io().nav_visible
     is_shown = is_reached or imgui.is_item_hovered(flags)
     if is_shown and is_above:
         _place_above(text)
+    elif is_shown and is_beside:
+        at = ImVec2(imgui.get_window_pos().x - theme.pt(TIP_GAP), imgui.get_item_rect_min().y)
+        imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(1.0, 0.0))
     elif is_reached:
         _place_tooltip()
     if is_shown:

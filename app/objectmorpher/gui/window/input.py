@@ -15,7 +15,7 @@ from ...commands import next_step, run, take_next_step
 from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.shortcuts import Shortcuts
-from ...editor.view import CHANGING, Hover, ToolName
+from ...editor.view import Hover, ToolName
 from ...system.texts import t
 from ...tools import navigate
 from ...tools.pointer import Button, Pointer, PointerShape
@@ -118,6 +118,16 @@ class KeyboardFocus:
         context.nav_layer = layer.menu if pane == MENU else layer.main
         imgui.internal.nav_init_window(window, True)
         imgui.set_nav_cursor_visible(True)
+
+
+def _is_in_step() -> bool:
+    """Whether the button that is held now is the one that is held in ImGui's frame.
+
+    While a frame was slow it may have gone up, and down again elsewhere: for another stroke.
+    """
+    queue = imgui.get_current_context().input_events_queue
+    kind = imgui.internal.InputEventType.mouse_button
+    return any(imgui.get_io().mouse_down) and all(event.type != kind for event in queue)
 
 
 def is_for_controls(keys: str) -> bool:
@@ -248,7 +258,7 @@ class Input:
         """
         io = imgui.get_io()
         has_mouse = imgui.is_mouse_pos_valid()  # else it has left, and is at minus 3e38
-        if at is not None:
+        if at is not None and _is_in_step():
             self.mouse = at
         elif has_mouse:
             self.mouse = io.mouse_pos.x, io.mouse_pos.y
@@ -290,9 +300,8 @@ class Input:
     def hint(self, editor: Editor) -> str:
         if editor.document is None:
             return t("Open a photo, drop one here, or try a sample")
-        own = editor.object
-        if own is not None and _is_held(editor) and editor.hover.other is None:
-            return t("{name} is locked", name=own.name)
+        if _is_held(editor) and editor.hover.other is None:
+            return editor.why_held or ""
         return TOOLS[editor.view.tool].hint(editor)
 
     def take_key(self, keys: str) -> None:
@@ -474,10 +483,7 @@ def _is_locked(editor: Editor, pointer: Pointer) -> bool:
 
 def _is_held(editor: Editor) -> bool:
     """Whether the tool would change the current object, which is locked, or not seen to move."""
-    own, tool = editor.object, editor.view.tool
-    if own is None or tool not in CHANGING or tool is ToolName.SELECT:
-        return False
-    return own.is_locked or (not own.is_visible and tool is not ToolName.MASK)
+    return editor.view.tool is not ToolName.SELECT and editor.why_held is not None
 
 
 def _hover(tool: Tool, editor: Editor, pointer: Pointer) -> PointerShape:

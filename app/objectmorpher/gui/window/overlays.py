@@ -70,7 +70,7 @@ def draw_card(canvas: CanvasPainter) -> None:
     editor, rect = canvas.editor, canvas.rect
     view = editor.view
     is_posing = view.tool is ToolName.POSE and view.pose.mode is PoseMode.DRAG
-    is_free = editor.is_lifted and editor.object is not None and not editor.object.is_locked
+    is_free = editor.is_lifted and editor.why_held is None
     is_meant = is_posing and is_free and view.shown is Shown.COMPOSITE
     if not is_meant or POSING in editor.settings.dismissed or editor.hand.is_busy:
         return

@@ -43,14 +43,14 @@ def _draw_tab(editor: Editor, tab: Tab, rect: Rect) -> None:
     name, is_shown = tab.name or t("New tab"), tab is editor.tab
     start, end = ImVec2(rect.x, rect.y), ImVec2(rect.x + rect.width, rect.y + rect.height)
     is_near = imgui.is_mouse_hovering_rect(start, end)
-    if is_near and not is_shown and tab.document is not None and _is_object_dragged(editor):
+    if is_near and not is_shown and _is_object_dragged(editor):
         editor.tabs.aimed = tab
     has_cross = is_shown or rect.width >= theme.pt(NARROW)
     beside = theme.pt(CROSS) if has_cross else 0.0
     draw = imgui.get_window_draw_list()
     if is_shown or is_near:  # the tab that is shown goes over into the picture below it
         draw.add_rect_filled(start, end, theme.u32("surround" if is_shown else "hovered"))
-    if tab is editor.tabs.aimed:
+    if tab is editor.tabs.aimed and tab.document is not None:
         draw.add_rect(start, end, theme.u32("accent"), thickness=theme.pt(2))
     if is_shown:
         high = ImVec2(end.x, start.y + theme.pt(2))
