@@ -151,12 +151,12 @@ def _register(document: Document, thing: EditObject) -> None:
 def compile_beside() -> bool:
     """Has the largest kernels compiled by other processes; whether there is anything to compile.
 
-    Whoever needs one of them waits for it (`kernel_files`). An installer's copy does it in another
-    way, at its first start.
+    Whoever needs one of them waits for it (`kernel_files`); asked again, the processes stay the
+    same. An installer's copy does it in another way, at its first start.
     """
     if installation.is_frozen() or kernel_files.is_kept(draw_layers):
         return False
-    if core_count() > 1:
+    if core_count() > 1 and not kernel_files.elsewhere:
         path = os.pathsep.join(filter(None, sys.path))
         for name, (_, modules) in PARTS.items():
             process = Popen(

@@ -114,10 +114,25 @@ def lifted_once() -> Iterator[None]:
     from objectmorpher_core.lift.relief.lifter import ReliefLifter
     from objectmorpher_core.scripting import background
 
+    yield from _remembering_all(
+        (ReliefLifter, "lift"), (plate, "find_residue"), (background, "find_old_shadow")
+    )
+
+
+@pytest.fixture(scope="module")
+def filled_once() -> Iterator[None]:
+    """For a module: the same hole of the same photo is filled in once, with the same seed.
+
+    That a fill is the same each time is tested in tests/core/compose.
+    """
+    from objectmorpher_core.compose.plate.inpaint_patchmatch import PatchMatchInpainter
+
+    yield from _remembering_all((PatchMatchInpainter, "inpaint_from"))
+
+
+def _remembering_all(*functions: tuple[Any, str]) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        for owner, name in (
-            (ReliefLifter, "lift"), (plate, "find_residue"), (background, "find_old_shadow"),
-        ):  # fmt: skip
+        for owner, name in functions:
             patch.setattr(owner, name, _remembering(getattr(owner, name)))
         yield
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F64, I32, Mask
+from ..base.arrays import F64, I32, Mask, frozen
 from ..base.camera import Camera
 from ..base.kernel_files import numba
 from . import tiles
@@ -84,7 +84,7 @@ def _around(drawable: Drawable, near: I32, corner: F64, size: int) -> Drawable:
     rows[:, CY] -= corner[1]
     camera = drawable.camera.windowed(float(corner[0]), float(corner[1]), size, size)
     order = None if drawable.order is None else np.arange(len(near), dtype=np.uint32)
-    return replace(drawable, projected=rows, order=order, camera=camera)
+    return replace(drawable, projected=frozen(rows), order=order, camera=camera)
 
 
 def _probe(drawable: Drawable, texture: TextureLevels, at: F64, near: I32) -> Hit | None:

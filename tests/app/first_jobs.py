@@ -1,13 +1,15 @@
 """What users do first, each with a part of the program that compiles something.
 
 `python first_jobs.py FOLDER` warms up and then does all of it in one process; it says, as JSON, how
-many kernels the warm-up looked for, and which others were asked for afterwards: `test_warm_up`.
+many kernels the warm-up looked for, which others were asked for afterwards, and which for arrays
+that differ only in whether they may be written to: `test_warm_up`.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -123,4 +125,6 @@ if __name__ == "__main__":
     warm = set(names)
     import_everything(Path(sys.argv[1]))
     lift_and_repair()
-    print(json.dumps({"warm": len(warm), "others": sorted(names - warm)}))
+    alike = Counter(name.replace("readonly ", "") for name in names)
+    twins = sorted(name for name, count in alike.items() if count > 1)
+    print(json.dumps({"warm": len(warm), "others": sorted(names - warm), "twins": twins}))

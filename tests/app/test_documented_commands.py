@@ -20,7 +20,7 @@ from objectmorpher_core.scripting.animation import Clip
 from tests.core.lift.registered import two_sides
 from tests.photos import outlined
 
-pytestmark = pytest.mark.usefixtures("lifted_once")
+pytestmark = pytest.mark.usefixtures("lifted_once", "filled_once")
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "howto").glob("*.md"))]

@@ -27,3 +27,4 @@ def test_after_the_warm_up_neither_an_import_nor_a_lift_compiles_anything(
     told = json.loads(done.stdout)
     assert told["warm"] > 50
     assert told["others"] == []
+    assert told["twins"] == [], "compiled twice, which takes seconds"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -11,9 +13,11 @@ from typing import Any
 
 from numba.core import caching
 
+from objectmorpher_core import warm_up
 from objectmorpher_core.base import kernel_files  # noqa: F401  (names the files)
+from objectmorpher_core.base.threads import core_count
+from tests.tree import PYTHONPATH, ROOT
 
-ROOT = Path(__file__).parents[2]
 Files: Any = caching.IndexDataCacheFile
 KEYS = ("8 bits", "16 bits")
 
@@ -34,6 +38,26 @@ def test_two_processes_that_write_at_once_leave_no_wrong_kernel(tmp_path: Path) 
     found = Files(str(tmp_path), "blend", 1)
     assert all(found.load(key) in (None, key) for key in KEYS)
     assert any(found.load(key) == key for key in KEYS)
+
+
+ASKED_TWICE = """
+from objectmorpher_core import warm_up
+from objectmorpher_core.base import kernel_files
+assert warm_up.compile_beside()
+first = dict(kernel_files.elsewhere)
+assert warm_up.compile_beside() and kernel_files.elsewhere == first
+print(len(set(first.values())))
+"""
+
+
+def test_large_kernels_are_compiled_beside_by_one_process_each(tmp_path: Path) -> None:
+    """An edit asks for it, and the warm-up: all would be compiled as often."""
+    own = os.environ | {"PYTHONPATH": PYTHONPATH, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", ASKED_TWICE], cwd=ROOT, env=own, check=True,
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert int(done.stdout) == (len(warm_up.PARTS) if core_count() > 1 else 0)
 
 
 def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:

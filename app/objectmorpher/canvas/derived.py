@@ -25,6 +25,7 @@ from objectmorpher_core.document.model import (
 )
 
 from ..editor.view import ViewState
+from .layer import is_front
 from .memo import Memo
 from .shape import CanvasShape, RestSurface, Shapes, build_shape
 
@@ -88,6 +89,7 @@ class Derived:
         # The last background that was shown, and for which masks it was made
         self._filled: tuple[tuple[Mask, ...], Plate] | None = None
         self._seen, self._bare = Memo(2), Memo(2)
+        self._order = Memo(2)
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -219,6 +221,22 @@ class Derived:
         puppet = self.shape(document.photo, thing).puppet
         return self._posed.setdefault(k, Memo(POSES))(
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
+        )
+
+    def order(self, document: Document) -> list[int]:
+        """The lifted objects and what stays in front, back to front."""
+        return list(self._order(lambda: self._ordered(document), document))
+
+    def _ordered(self, document: Document) -> list[int]:
+        from objectmorpher_core.compose.order import back_to_front
+
+        objects = document.objects
+        fronts = [k for k in range(len(objects)) if is_front(document, k)]
+        there = [k for k, o in enumerate(objects) if o.lifted or k in fronts]
+        if len(there) < 2:
+            return there
+        return back_to_front(
+            document, {k: None if k in fronts else self.posed(document, k) for k in there}
         )
 
     def draft(self, document: Document, k: int) -> PosedSplats:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from objectmorpher_core import compose
-
 from ..editor.editor import Editor
 from ..editor.intents.composing import DEPTH, VARIANTS
 from ..editor.intents.old_shadows import SHADOW
@@ -78,10 +76,11 @@ def _cannot_fill(editor: Editor) -> str | None:
     if editor.jobs.is_busy(PLATE):
         return t("The background is being filled in…")
     document, name = editor.document, editor.composing.inpainter
-    if (reason := compose.missing(name)) is not None:
+    reason, is_random = editor.methods.filler(name)
+    if reason is not None:
         return sentence(reason)
     if document is not None and document.plate is not None:
-        is_same = document.plate.backend == name and not compose.is_random(name)
+        is_same = document.plate.backend == name and not is_random
         if is_same and document.plate.painted is None:
             return t("This filler gives the same picture every time")
     return nothing_lifted(editor)
@@ -92,10 +91,10 @@ def _cannot_vary(editor: Editor) -> str | None:
         return t("The variants are being made")
     if (trouble := editor.composing.trouble) is not None:
         return nothing_lifted(editor) or trouble
-    name = editor.composing.inpainter
-    if (reason := compose.missing(name)) is not None:
+    reason, is_random = editor.methods.filler(editor.composing.inpainter)
+    if reason is not None:
         return sentence(reason)
-    if not compose.is_random(name):
+    if not is_random:
         return t("This filler gives the same picture every time")
     return nothing_lifted(editor)
 

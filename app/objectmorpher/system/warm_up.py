@@ -143,7 +143,4 @@ def _open(photo: Path | None) -> None:
 
 
 if __name__ == "__main__":
-    from objectmorpher_core.warm_up import compile_beside
-
-    compile_beside()
     warm_up()

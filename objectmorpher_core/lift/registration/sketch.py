@@ -273,8 +273,8 @@ def sketch(surfels: Surfels, pose: F64, camera: Camera) -> F32:
     """
     out = np.empty((camera.height, camera.width, CHANNELS), np.float32)
     intrinsics = frozen(np.array([camera.focal, camera.cx, camera.cy], np.float64))
-    draw(surfels.points, surfels.normals, surfels.colors, surfels.spacing,
-         frozen(pose, np.float64), intrinsics, out)  # fmt: skip
+    own = np.array(pose, np.float64)  # writable, as `search` has it: else `draw` is compiled twice
+    draw(surfels.points, surfels.normals, surfels.colors, surfels.spacing, own, intrinsics, out)
     return out
 
 

@@ -33,6 +33,18 @@ def test_what_cannot_run_says_why_and_all_else_can(editor: Editor) -> None:
     }  # fmt: skip
 
 
+def test_what_fills_is_asked_once_until_a_model_comes_or_goes(editor: Editor) -> None:
+    """Every frame of the panel wants to know, and the core looks for packages on the disk."""
+    methods = editor.methods
+    for name in ("auto", *compose.BACKENDS):
+        reason = compose.missing(name)
+        assert methods.filler(name) == (reason, reason is None and compose.is_random(name))
+    before = methods.filler("auto")
+    assert methods.filler("auto") is before
+    methods.forget()
+    assert methods.filler("auto") is not before
+
+
 def test_a_choice_is_a_setting_and_is_used(editor: Editor) -> None:
     methods = looked(editor).methods
     methods.choose("segment", "grabcut")

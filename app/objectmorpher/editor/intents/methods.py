@@ -57,10 +57,11 @@ class Methods:
         self._stages: dict[str, StageReport] = {}  # empty until looked at
         self._is_asked = self._is_told = False
         self._served: tuple[Server, Offers] | None = None  # with no offers until it answers
+        self._fillers: dict[str, tuple[str | None, bool]] = {}
 
     def forget(self) -> None:
         """A model came or went: what can run is looked at again, when it is wanted."""
-        self._stages, self._served = {}, None
+        self._stages, self._served, self._fillers = {}, None, {}
         self._is_asked = self._is_told = False
 
     @property
@@ -98,6 +99,16 @@ class Methods:
             if stage in self._stages:
                 return t("No refinement model is installed: Window > Models… gets one")
         return next(m.why_not for m in self.of(stage) if m.name == chosen)
+
+    def filler(self, name: str) -> tuple[str | None, bool]:
+        """Why an inpainter cannot run here, or None; whether another seed gives another fill.
+
+        Asked in every frame: to look for packages takes milliseconds, so the answer is kept.
+        """
+        if name not in self._fillers:
+            reason = compose.missing(name)
+            self._fillers[name] = reason, reason is None and compose.is_random(name)
+        return self._fillers[name]
 
     @property
     def _server(self) -> Server | None:

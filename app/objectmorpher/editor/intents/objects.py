@@ -14,7 +14,6 @@ from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.document import edits, visitor_edits
 from objectmorpher_core.document.model import Document, EditObject, Photo, Placement
 
-from ...canvas.layer import is_front
 from ...canvas.shape import CanvasShape, build_shape, rehearse
 from ...system import clipboard
 from ...system.texts import t
@@ -224,18 +223,8 @@ class Objects:
 
     def order(self) -> list[int]:
         """The lifted objects and what stays in front, back to front."""
-        from objectmorpher_core.compose.order import back_to_front
-
         document = self._editor.committed
-        if document is None:
-            return []
-        objects = document.objects
-        fronts = [k for k in range(len(objects)) if is_front(document, k)]
-        there = [k for k, o in enumerate(objects) if o.lifted or k in fronts]
-        if len(there) < 2:
-            return there
-        posed = partial(self._editor.derived.posed, document)
-        return back_to_front(document, {k: None if k in fronts else posed(k) for k in there})
+        return [] if document is None else self._editor.derived.order(document)
 
     def listed(self) -> list[int]:
         """Return all selected objects in a list's order: the front one first."""

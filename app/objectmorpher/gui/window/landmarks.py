@@ -13,6 +13,7 @@ import json
 import os
 import time
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
@@ -83,6 +84,7 @@ def mark_on_canvas(label: str, low: ImVec2, high: ImVec2) -> None:
         _places[label] = (low.x, low.y, high.x, high.y)
 
 
+@lru_cache(1000)  # the same ones in each frame
 def clean(label: str) -> str:
     """Return a text as a user reads it: without icons (private use area) and ids."""
     text = label.partition("##")[0]
