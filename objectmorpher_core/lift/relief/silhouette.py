@@ -17,7 +17,7 @@ from ...base.kernel_files import numba
 from ...base.masks import box_of, dilated, disc
 from ...base.poisson_disk import distance_inside
 from ...document.model import Matte
-from ...segment.matting.matte import REACH, band_width, extended_mask, frame_extension, is_large
+from ...segment.matting.matte import band_width, extended_mask, frame_extension, is_large
 from .canvas import bilinear
 
 GRID = 256  # cells on the longer side of the box
@@ -266,6 +266,7 @@ def inwardness(alpha: F32, colors: F32) -> F32:
 SOLID = 0.9  # share of what is near, within the outline, that the matte covers where it is solid
 HOLLOW = 0.2  # of what is not, at least, is less than half covered: what is drawn never is
 LEAST = 12.0  # x the band squared: area of that
+OFF = 3.0  # x the band, that it is deep somewhere: elsewhere an edge is never so far off
 BESIDE = 2.0  # x the band, around what is not: strands there are none of the body
 PIECE = 0.05  # of the largest piece, at least, else it is a lock of hair
 
@@ -288,7 +289,7 @@ def solid_part(mask: Mask, matte: Matte) -> Mask:
     gaps = _opened(part & (share < SOLID * whole), spot)
     pieces, area = _pieces(gaps)
     away = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
-    deep = _pieces_in(pieces, away > REACH * band) > 0  # elsewhere an edge is never so far off
+    deep = _pieces_in(pieces, away > OFF * band) > 0
     is_gap = deep & (_pieces_in(pieces, alpha < 0.5) > HOLLOW * area) & (area > LEAST * band**2)
     gaps = is_gap[pieces]
     if not gaps.any():

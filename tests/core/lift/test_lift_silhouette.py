@@ -191,14 +191,16 @@ def test_what_is_covered_is_solid_however_thin_it_is(name):
         assert solid_part(mask, _matte(alpha)) is mask
 
 
-def test_gaps_between_hairs_and_single_hairs_are_not_solid():
+@pytest.mark.parametrize("width", [30, 5])
+def test_gaps_between_hairs_and_single_hairs_are_not_solid(width: int):
+    """Also where they are narrow, as around a long-haired dog, and a side would stand behind."""
     y, x = np.mgrid[:240, :320] + 0.5
     away = np.hypot(x - 160, y - 120)
     hairs = np.sin(60 * np.arctan2(y - 120, x - 160)) > 0.6
     limb = (np.abs(y - 120) < 2) & (x < 160) & (x > 20)
-    alpha = (away < 60) | (away < 90) & hairs | limb
-    mask = (away < 90) | limb
+    alpha = (away < 60) | (away < 60 + width) & hairs | limb
+    mask = (away < 60 + width) | limb
     solid = solid_part(mask, _matte(alpha))
     assert solid[away < 55].all()
-    assert not solid[(away > 70) & (x > 160)].any()
+    assert not solid[(away > 60 + width / 3) & (x > 160)].any()
     assert solid[limb & (x < 60)].all(), "what is thin and apart from hair stays"
