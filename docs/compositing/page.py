@@ -188,8 +188,8 @@ third of its foot, is filled in with the thing, when that has left its place. It
 were chosen on 50 photographs, of which six have such a strip; one of the six is a dark tray
 under a vase. Of 30 others four do, two cars and two shoes, and all four are strips. In one of
 56 made scenes on which nothing was chosen, and in which the thing throws no shadow, something
-else is taken for a strip. A foot that curves upwards at its sides, such as a lamp's on its edge, has none
-that is found.
+else is taken for a strip. A foot that curves upwards at its sides, such as a lamp's on its
+edge, has none that is found.
 
 Holes in photos that none of the above are of (PSNR, SSIM, HED):
 

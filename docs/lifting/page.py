@@ -207,13 +207,16 @@ beside the solid in 37 of the 63 cases of [the benchmark](../evaluation.md), and
 pick-up and a camera, were taken for hair; now none. Of a made furry ball with twelve long hairs
 more than four fifths of their length goes along.
 
-A mask that was drawn around hair takes in the background between it, which stood beside a turned
-head as a shell. Where the mask lies on no edge of the picture and colours agree, the matte is now
-looked for three times as far from it, and the body ends where the object is solid; the brim carries
-the rest. Of what is seen of a made furry disc, turned by 25 degrees, 5 % have the ground's colours
-instead of 24. Of six photographs of animals and people an alpaca's fleece, a horse's head and tail
-and one side of a man's hair have lost their shells; a dog's side, a mane, and hair before leaves
-have not. The composites of [matting](../matting/README.md), whose masks fit, stay as they were.
+A mask that was drawn around hair takes in the background between it, which stood beside a
+turned head as a shell. Where the mask lies on no edge of the picture and colours agree, the
+matte is now looked for three times as far from it, and the body ends where the object is solid;
+the brim carries the rest. Of what is seen of a made furry disc, turned by 25 degrees, 5 % have
+the ground's colours instead of 24. Of six photographs of animals and people an alpaca's fleece,
+a horse's head and tail, one side of a man's hair and a corgi's side have lost their shells; a
+mane, and hair before leaves have not. Gaps count that are three times as deep as a mask's edge
+is off elsewhere. Twice as deep, a can, a candle and a bag would lose what only looks like the
+background. The composites of [matting](../matting/README.md), whose masks fit, stay as they
+were.
 
 ## Beyond the photo's frame
 
