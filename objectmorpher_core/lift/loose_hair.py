@@ -171,7 +171,7 @@ def _around(image: np.ndarray, sigma: float) -> F32:
 # How much of a pixel a hair covers cannot be seen, only that times how unlike the background it is.
 # It is taken to be little, so that nothing of the background comes along.
 
-MARGIN = 2.5  # x the matte's band
+MARGIN = 2.5  # x the matte's band: a hundredth of the photo's diagonal
 CONTEXT = 8  # x margin, seen around it
 BEHIND = (0.5, 1.2, 2.5)  # x margin: so far around, what is behind is averaged, the nearest first
 MORE = 1.25  # x the least that it can cover
@@ -236,10 +236,10 @@ FLAT = 0.1  # x their width
 def with_hair_along(
     lifted: LiftedObject, matte: Matte, whole: Matte, camera: Camera, seed: int = 0
 ) -> LiftedObject:
-    """What was `lifted` from a `matte` with the loose hair of the `whole` one.
+    """What was `lifted` from a `matte`, with the loose hair of the `whole` one.
 
-    It faces the camera, as deep as the soft edge beside it, of which only a relief has one; else it
-    stays away.
+    The hair faces the camera, as deep as the soft edge beside it. Only a relief has such an edge:
+    what was lifted in another way is returned as it is.
     """
     edge = np.flatnonzero(lifted.texture.solidity < 0.5)
     if whole is matte or not len(edge) or not lifted.splatting.startswith("edged"):
