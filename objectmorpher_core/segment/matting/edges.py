@@ -165,7 +165,7 @@ def sharpen_band(rgb: RGB, mask: Mask, near: Mask | None = None, band: int = BAN
     if around is None:
         return mask
     own = mask[around]
-    inner, outer = _core(own, band), _core(~own, band)
+    inner, outer = core(own, band), core(~own, band)
     if near is not None:
         inner, outer = inner | (own & ~near[around]), outer | (~own & ~near[around])
     unknown = ~(inner | outer)
@@ -197,12 +197,15 @@ def rehearse() -> None:
     sharpen_band(np.zeros((8, 8, 3), np.uint8), mask)
 
 
-def _core(mask: Mask, band: int) -> Mask:
-    """(H, W) what is surely inside: deeper than `band` px, or than half of what is thin."""
+def core(mask: Mask, band: float, limb: float = CORE) -> Mask:
+    """(H, W) what is surely inside: deeper than `band` px, or than `limb` of what is thin.
+
+    That is a share of the depth of a thin thing's middle.
+    """
     depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
-    size = THIN * band + 1
+    size = THIN * int(band) + 1
     thickness = cv2.dilate(depth, np.ones((size, size), np.uint8))
-    return mask & (depth > np.minimum(band, CORE * thickness))
+    return mask & (depth > np.minimum(band, limb * thickness))
 
 
 def enlarge(rgb: RGB, mask: Mask) -> Mask:

@@ -1,21 +1,32 @@
-"""Where a mask's edge is farther off than it is thought to be: about hair, fur and manes.
+"""Where a mask's edge is farther off than it is thought to be.
 
-A selection goes around hair in one line, and takes in what shows between and beside the strands.
+An outline lies beside the edge: pieces of a photo may hold ground as well, ripples about a head, or
+grass between two legs. The outline is moved to the edge where colours and the edge itself speak
+for it (`settle_outline`).
+
+Or there is no line: a selection goes around hair, fur and manes in one, and takes in what shows
+between and beside the strands.
 Alpha is solved for once more on a small picture, with the edge free to be anywhere in a wide band.
 That leaks as well into a white sleeve before a white wall; so it is believed only where colours
 alone say the same, those of the object well inside that band and of the background well outside,
 and where the mask's outline lies on no edge of the picture; within such an edge all is the
-object's.
+object's (`strays`).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...base.arrays import F32, Mask, Pixels
+from ...base.arrays import F32, RGB, Mask, Pixels
+from ...base.masks import dilated
 from ...base.threads import in_threads
+from ..selection import box_around
+from .closed_form import Expected, solve_alpha
+from .edges import core, sharpen_band
 from .soft_edge import WHOLE, WHOLE_PICTURE, CropSize, clearness_of, signed_distance, whole_band
 
 STRAY = 3.0  # x band: how far an edge may be off where hair is
@@ -123,3 +134,126 @@ def _large(found: Mask, change: F32, least: float) -> Mask:
     total = np.bincount(pieces.ravel(), weights=change.ravel(), minlength=count)
     total[0] = 0
     return (total >= least)[np.asarray(pieces, np.int32)]
+
+
+LOOKED = 200.0  # px: the root of the object's area, to which a larger picture of it is reduced
+OFF, SEEN = 0.08, 0.35  # x that root: how far its outline may be off; what is seen around it
+LIMB = 0.45  # x depth of the middle of a thin thing: deeper is surely inside
+OUTLINE, OUTLINE_ROUNDS = 3e-4, 150  # weight of the outline as it is; rounds of the solver
+SMALLEST = 8e-4  # x the object's area, of what is moved to the other side
+OTHER = 0.62  # how likely, in the mean, its colours are the other side's
+CLEARER = 1.4  # x the contrast of the edge on which the outline was
+BESIDE_PIECE = 2.0  # x how far the outline may be off: so far away colours are compared
+FEW, ENOUGH = 20, 1500  # px of a side: fewer say nothing, more are not looked at
+PLACE = 0.15  # of CIELAB / 100 for that whole way: how much rather a colour is looked for nearby
+EVEN = 1.0  # px, over which contrast is measured
+
+
+class _Side(NamedTuple):
+    """What is moved to the other side of the outline, in a window of the picture."""
+
+    piece: Mask  # (h, w)
+    is_lost: bool  # to the background
+    object: Mask  # (h, w) what is the object's before and after
+    ground: Mask  # (h, w) what is not
+
+
+def settle_outline(rgb: RGB, mask: Mask, kept: Mask | None = None) -> Mask:
+    """A mask (H, W) of a picture (H, W, 3), its outline on the edge where it lay beside it.
+
+    Wide-band matting (Levin et al. 2008) says where else the outline may be. What lies between goes
+    to the other side if its colours are more like those there, near by, and if the outline lies
+    on a clearer edge then. Nothing is changed that has a px in common with `kept` (H, W).
+    """
+    root = float(np.sqrt(np.count_nonzero(mask)))
+    around = box_around(mask, SEEN * root)
+    if around is None or mask.all():
+        return mask
+    own, scale = mask[around], min(LOOKED / root, 1.0)
+    size = (max(round(own.shape[1] * scale), 3), max(round(own.shape[0] * scale), 3))
+    small = np.asarray(cv2.resize(rgb[around], size, interpolation=cv2.INTER_AREA), np.uint8)
+    moved = np.zeros_like(own)
+    for piece in _beside_edge(small, _sized(own, size), OFF * root * scale):
+        there = _sized(piece, own.shape[::-1])
+        if kept is None or not (there & kept[around]).any():
+            moved |= there
+    if not moved.any():
+        return mask
+    settled, near = mask.copy(), np.zeros_like(mask)
+    settled[around] ^= moved
+    near[around] = dilated(moved, round(1 / scale) + 1)
+    return sharpen_band(rgb, settled, near)
+
+
+def _sized(mask: Mask, size: tuple[int, ...]) -> Mask:
+    """A mask (H, W) at another size (width, height)."""
+    how = cv2.INTER_AREA if size[0] < mask.shape[1] else cv2.INTER_LINEAR
+    return cv2.resize(mask.astype(np.float32), (size[0], size[1]), interpolation=how) > 0.5
+
+
+def _beside_edge(rgb: RGB, mask: Mask, off: float) -> list[Mask]:
+    """The pieces (h, w) between a mask's outline and the edge, at most `off` px away."""
+    found = _wide(rgb, mask, off)
+    picture = rgb.astype(np.float32) / np.float32(255)
+    lab = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2LAB), np.float32) / np.float32(100)
+    contrast, far = _contrast(lab), int(BESIDE_PIECE * off)
+    differs = cv2.morphologyEx(
+        (found != mask).astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8)
+    )
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(differs, connectivity=4)
+    large = stats[:, cv2.CC_STAT_AREA] >= SMALLEST * np.count_nonzero(mask)
+    pieces = []
+    for k in np.flatnonzero(large[1:]) + 1:
+        x, y, width, height = (int(v) for v in stats[k, :4])
+        window = np.s_[max(y - far, 0) : y + height + far, max(x - far, 0) : x + width + far]
+        piece = labels[window] == k
+        near = dilated(piece, far) & ~piece & (mask[window] == found[window])
+        is_lost = bool(mask[window][piece][0])
+        side = _Side(piece, is_lost, near & mask[window], near & ~mask[window])
+        if _is_clearer(contrast[window], side) and _is_others(lab[window], side, far):
+            pieces.append(labels == k)
+    return pieces
+
+
+def _wide(rgb: RGB, mask: Mask, off: float) -> Mask:
+    """(h, w) the matte of a band `off` px wide about a mask's outline, where it is above half."""
+    unknown = ~(core(mask, off, LIMB) | core(~mask, off, LIMB))
+    known = mask.astype(np.float32)
+    start = np.where(unknown, cv2.GaussianBlur(known, (0, 0), off / 2), known)
+    expected = Expected(known, np.full(mask.shape, OUTLINE, np.float32))
+    picture = rgb.astype(np.float32) / np.float32(255)
+    alpha = solve_alpha(picture, unknown, expected, start.astype(np.float32), OUTLINE_ROUNDS)
+    return np.asarray(alpha > 0.5, np.bool_)
+
+
+def _contrast(lab: F32) -> F32:
+    """(h, w) the slope of the colours (h, w, 3)."""
+    even = cv2.GaussianBlur(lab, (0, 0), EVEN)
+    across, down = (cv2.Sobel(even, cv2.CV_32F, *way) for way in ((1, 0), (0, 1)))
+    return np.asarray(np.sqrt((across**2 + down**2).sum(-1)), np.float32)
+
+
+def _is_clearer(contrast: F32, side: _Side) -> bool:
+    """Whether the outline beyond what is moved has more `contrast` (h, w) than before it."""
+    ring = dilated(side.piece, 1)
+    old, new = (side.ground, side.object) if side.is_lost else (side.object, side.ground)
+    before, after = (dilated(ring & beyond, 1) for beyond in (old, new))
+    if not after.any():
+        return False
+    usual = float(contrast[before].mean()) if before.any() else 0.0
+    return bool(contrast[after].mean() > CLEARER * usual)
+
+
+def _is_others(lab: F32, side: _Side, far: int) -> bool:
+    """Whether what is moved looks like the side that it goes to."""
+    if min(np.count_nonzero(side.object), np.count_nonzero(side.ground)) < FEW:
+        return False
+    place = np.indices(side.piece.shape, dtype=np.float32).transpose(1, 2, 0) * (PLACE / far)
+    features = np.concatenate([lab, place], -1)
+    asked, apart = features[side.piece], []
+    for there in (side.object, side.ground):
+        known = features[there]
+        found, _ = KDTree(known[:: -(-len(known) // ENOUGH)]).query(asked, k=NEIGHBOURS)
+        apart.append((found[:, -1] + ALIKE) ** 2)
+    likely = apart[0] / (apart[0] + apart[1])
+    return bool((likely if side.is_lost else 1 - likely).mean() > OTHER)

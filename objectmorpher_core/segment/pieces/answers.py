@@ -10,6 +10,7 @@ import numpy as np
 from ...base.arrays import RGB, Mask
 from ...document.model import Click, Prompt
 from ..matting.edges import BAND, sharpen_band
+from ..matting.straying import settle_outline
 from ..selection import fill_small_holes, is_bounded, keep_touched, nest
 from .choice import (
     LARGER_CORRECTION,
@@ -296,7 +297,10 @@ def begin(
     """
     pieces = ground.pieces
     mask = sharpen_band(image, pieces.paint(choice.pieces), band=_band(pieces))
-    mask = _tidy(mask, _reduced(pieces, prompt))
+    small = _reduced(pieces, prompt)
+    mask = _tidy(mask, small)
+    settled = settle_outline(image, mask, _clicked(small, mask.shape))
+    mask = _tidy(settled & ground.free(prompt) if is_bounded(prompt) else settled, small)
     if whole is not None:
         mask = nest(mask, whole, prompt.level)
     return PieceAnswer(mask, choice.relative)
@@ -395,6 +399,14 @@ def _tidy(mask: Mask, small: Prompt, near: Mask | None = None) -> Mask:
         stays[0] = False
         kept = kept | stays[labels]
     return fill_small_holes(kept, small)
+
+
+def _clicked(small: Prompt, shape: tuple[int, ...]) -> Mask:
+    """(h, w) the px of clicks, of a prompt in px of the reduced photo."""
+    clicked = np.zeros(shape[:2], bool)
+    for click in small.clicks:
+        clicked[int(click.y), int(click.x)] = True
+    return clicked
 
 
 def _reduced(pieces: Pieces, prompt: Prompt) -> Prompt:
