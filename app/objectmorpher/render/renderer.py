@@ -375,7 +375,7 @@ class Renderer:
         buffer = self._target = self._kept.begin(self._size, self._surround)
         buffer.scissor = box
         self._draw(scene, view, viewport)
-        buffer.scissor = (0, 0, *self._size)
+        buffer.scissor = (0, 0, self._size[0], self._size[1])
         self._target = self._context.screen
         data = buffer.read(viewport=box, components=4, alignment=1)
         return np.frombuffer(data, np.uint8).reshape(box[3], box[2], 4)[::-1].copy()
