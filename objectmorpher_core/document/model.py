@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -275,6 +276,8 @@ class LiftedObject:
 
 
 UNMOVED = frozen(np.eye(4))
+MOTIONS = 8  # of an object, that are remembered
+_motions: WeakKeyDictionary[LiftedObject, dict[object, F64]] = WeakKeyDictionary()
 UNIT = 1e-6  # by which the length of a direction may differ from 1
 
 
@@ -296,8 +299,11 @@ class Placement:
 
         Raises ValueError where the object would pass behind the camera.
         """
-        if self.is_identity:  # usual, and asked for a dozen times a frame
+        if self.is_identity:
             return UNMOVED
+        known = _motions.setdefault(lifted, {})  # a frame asks a dozen times
+        if (motion := known.get((self, camera))) is not None:
+            return motion.copy()
         centre = lifted.centre
         if centre[2] <= 0:
             raise ValueError(
@@ -312,6 +318,9 @@ class Placement:
         motion = np.eye(4)
         motion[:3, :3] = linear
         motion[:3, 3] = target - linear @ centre
+        if len(known) >= MOTIONS:
+            known.clear()
+        known[self, camera] = motion.copy()
         return motion
 
 

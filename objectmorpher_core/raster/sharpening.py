@@ -29,7 +29,9 @@ MOST_SLOPE = 6.0  # change of the map, x the step of a coarse px: with more it i
 ROUNDS = 2  # px by which the map is continued, so that it can be interpolated at the edge
 PARTS = 4  # pieces of the picture for each thread
 FULL = np.float32(255.0)
-A_ON, EIGHT = np.uint64(A), np.uint64(8)
+WHOLE = np.float32(0.999)  # share of the photo: with less the coarse colours are seen
+A_ON, SHARE_ON, SX_ON, SY_ON = (np.uint64(c) for c in (A, SHARE, SX, SY))
+FOUR, EIGHT = np.uint64(4), np.uint64(8)
 
 
 def sharpen(
@@ -54,7 +56,7 @@ def sharpen(
     coarse, ends = _packed(picture, MOST_SLOPE * factor / zoom)
     height, width = box[3] - box[1], box[2] - box[0]
     rgba = np.zeros((height, width), "<i4")
-    invented = np.zeros((height, width) if is_marked else (0, 0), np.uint8)
+    invented = np.zeros((height, width) if is_marked else (1, 0), np.uint8)
     level = round(math.log2(max(1 / zoom, 1.0)))
     level = min(level, len(texture.shapes) - 1)
     scale = 2.0**-level
@@ -178,10 +180,7 @@ def _sharpen(first, last, own, fine, rgba, invented, is_marked):
     """Rows first..last of `rgba` and `invented`, all 0 before."""
     coarse, ends, factor = own.numbers, own.ends, fine.factor
     rows, numbers = coarse.shape
-    row, most = np.empty(numbers, np.float32), np.uint64(numbers - 8)
-    down, across, first_texel = fine.shape
-    stride = np.uint64(4 * across)
-    right, bottom = np.float32(across - 1), np.float32(down - 1)
+    row = np.empty(numbers, np.float32)
     for y in range(first, last):
         v = (np.float32(y) + HALF) / factor - HALF
         i = min(max(int(math.floor(v)), 0), rows - 1)
@@ -190,25 +189,61 @@ def _sharpen(first, last, own, fine, rgba, invented, is_marked):
         for c in range(8 * max(start - 2, 0), min(8 * (end + 2), numbers)):
             row[c] = coarse[i, c] + t * (coarse[below, c] - coarse[i, c])
         start, end = int(factor) * (start - 1), int(factor) * (end + 1)
-        for x in range(max(start, 0), min(end, rgba.shape[1])):
-            one = own.pixels[x]
-            two = min(one + EIGHT, most)
-            if row[one + A_ON] <= ZERO and row[two + A_ON] <= ZERO:
-                continue
-            r, g, b, a, share, shift_x, shift_y, _ = between(row, one, two, own.shares[x])
+        _sharpen_row(
+            max(start, 0), min(end, rgba.shape[1]), row, own.pixels, own.shares, fine,
+            fine.top + np.float32(y) * fine.step, fine.texels, rgba[y],
+            invented[y if is_marked else 0], is_marked,
+        )  # fmt: skip
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
+def _sharpen_row(
+    start, end, row, pixels, shares, fine, here, texels, to, invented, is_marked
+):  # fmt: skip
+    """The px start..end of a row of the view; `row`: the coarse px there, `here`: its texel's row.
+
+    Between two coarse px inside the object the photo alone is seen, unless it is transparent.
+    """
+    left, step, scale, most = fine.left, fine.step, fine.scale, np.uint64(len(row) - 8)
+    down, across, first_texel = fine.shape
+    stride, first = np.uint64(4 * across), np.uint64(4 * first_texel)
+    right, bottom = np.float32(across - 1), np.float32(down - 1)
+    wide, half = np.int64(fine.factor), np.int64(fine.factor) // 2
+    stop = half if start < half else start + (half - start) % wide
+    while start < end:
+        stop = min(stop, end)
+        one = pixels[start]
+        two = min(one + EIGHT, most)
+        count, x0 = np.uint64(stop - start), np.uint64(start)
+        start, stop = stop, stop + wide
+        a, b = row[one + A_ON], row[two + A_ON]
+        if a <= ZERO and b <= ZERO:
+            continue
+        sx, sy = row[one + SX_ON], row[one + SY_ON]
+        dx, dy = scale * (row[two + SX_ON] - sx), scale * (row[two + SY_ON] - sy)
+        u0, v0 = left + scale * sx, here + scale * sy
+        is_inner = (min(a, b) > INNER) & (min(row[one + SHARE_ON], row[two + SHARE_ON]) > WHOLE)
+        for k in range(count):
+            x = x0 + k
+            t = shares[x]
+            u, v = u0 + np.float32(np.int32(x)) * step + t * dx, v0 + t * dy
+            is_there = (u >= ZERO) & (u < right) & (v >= ZERO) & (v < bottom)
+            column, line = np.int32(u), np.int32(v)
+            at = first + stride * np.uint64(np.uint32(line)) + FOUR * np.uint64(np.uint32(column))
+            share_x, share_y = u - np.float32(column), v - np.float32(line)
+            if is_inner and is_there:
+                texel = four_texels(texels, at, stride, share_x, share_y)
+                if texel[3] >= ONE:
+                    to[x] = bytes_over((texel[0], texel[1], texel[2], ONE), ONE, texel, ZERO)
+                    continue
+            r, g, b, a, share, _, _, _ = between(row, one, two, t)
             if is_marked:
-                invented[y, x] = np.uint8(np.int32((ONE - share) * a * FULL + HALF))
+                invented[x] = np.uint8(np.int32((ONE - share) * a * FULL + HALF))
             texel, alpha, rest = (ZERO, ZERO, ZERO, ZERO), ZERO, ONE - share
-            if share > ZERO:
-                u = fine.left + np.float32(x) * fine.step + fine.scale * shift_x
-                v = fine.top + np.float32(y) * fine.step + fine.scale * shift_y
-                if ZERO <= u < right and ZERO <= v < bottom:
-                    column, line = np.int32(u), np.int32(v)
-                    at = np.uint64(4 * (first_texel + line * across + column))
-                    share_x, share_y = u - np.float32(column), v - np.float32(line)
-                    texel = four_texels(fine.texels, at, stride, share_x, share_y)
-                    alpha = texel[3] * min(TWO * a, ONE) * share
+            if share > ZERO and is_there:
+                texel = four_texels(texels, at, stride, share_x, share_y)
+                alpha = texel[3] * min(TWO * a, ONE) * share
             if a > INNER:  # no edge of the cut-out: what is not found there has its coarse colour
                 rest = ONE - alpha
             over = texel[0], texel[1], texel[2], ONE
-            rgba[y, x] = bytes_over(over, alpha, (r, g, b, a), rest)
+            to[x] = bytes_over(over, alpha, (r, g, b, a), rest)

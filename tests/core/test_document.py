@@ -137,6 +137,22 @@ def test_turn_and_scale_are_about_the_centre(scene):
     assert np.abs(matrix[:3, :3] - 2.5 * turn_matrix(10, 20, 30)).max() < F64
 
 
+def test_a_placement_is_the_same_motion_each_time_and_of_each_object_its_own(scene):
+    """It is remembered; what somebody does with it changes nobody else's."""
+    there = scene.lifted
+    nearer = np.diag([0.5, 0.5, 0.5, 1.0]) @ there.world_from_object
+    other = replace(there, world_from_object=nearer)
+    places = [Placement(move=(float(k), 2.0), turn=(k, 0.0, 0.0)) for k in range(1, 20)]
+    first = [(p.matrix(there, scene.camera), p.matrix(other, scene.camera)) for p in places]
+    for (mine, others), place in zip(first, places, strict=True):
+        assert np.array_equal(place.matrix(there, scene.camera), mine)
+        assert not np.array_equal(mine, others)
+        place.matrix(there, scene.camera)[:] = 0.0
+        assert np.array_equal(place.matrix(there, scene.camera), mine)
+        wide = replace(scene.camera, focal=2 * scene.camera.focal)
+        assert not np.array_equal(place.matrix(there, wide), mine)
+
+
 def test_a_positive_yaw_takes_what_faces_the_camera_to_the_left(scene):
     lifted = scene.lifted
     front = lifted.centre - [0, 0, 0.1]

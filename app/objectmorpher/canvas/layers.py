@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.raster.tiles import Drawable
 
 
-FRAME = 0.009  # s, what rendering may take of a frame
+FRAME = 0.008  # s, what rendering may take of a frame
 STILL = 0.12  # s without a change, after which the exact picture is asked for
 COARSEST = 6  # canvas px per px of a draft
 FIRST_RATE = 2.5e-7  # s per px, before anything has been measured

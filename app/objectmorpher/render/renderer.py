@@ -32,7 +32,10 @@ Viewport = tuple[int, int, int, int]  # left, bottom, width, height of the canva
 
 # The pictures under the objects of a still view: the photo, and the edit's background.
 
-Draw = Callable[[Scene], U8]  # (h, w, 4) of the canvas, upright
+Part: TypeAlias = tuple[int, int, int, int]  # x0, y0, x1, y1 canvas px
+Draw = Callable[[Scene, Part | None], U8]  # (h, w, 4) of the canvas or a part of it, upright
+REACH = 8.0  # px of the photo, or of its halved copy: farther away nobody looks at a pixel of it
+FEW = 16  # rows that are compared at once: in the processor's cache
 
 
 class StillView:
@@ -56,20 +59,56 @@ class StillView:
         from .flattening import flatten
 
         under = Scene(scene.photo, scene.surround)
-        photo = self._picture("photo", under, draw)
+        photo = self._picture("photo", under, view, draw)
         back = photo
         if scene.plate is not None or scene.mask is not None:
             behind = replace(under, plate=scene.plate, mask=scene.mask, hatch=scene.hatch)
-            back = self._picture("back", behind, draw)
+            back = self._picture("back", behind, view, draw)
         return flatten(
             photo, back, scene.blend, scene.shades + scene.layers, photo_box(scene, view)
         )  # fmt: skip
 
-    def _picture(self, name: str, scene: Scene, draw: Draw) -> U8:
+    def _picture(self, name: str, scene: Scene, view: ViewState, draw: Draw) -> U8:
+        """By the shaders, where it is another one than in the frame before: they take their time.
+
+        Of the background a drag changes little, but in one frame of four.
+        """
         kept = self._pictures.get(name)
-        if kept is None or not same_scene(kept[0], scene):
-            kept = self._pictures[name] = (scene, draw(scene))
-        return kept[1]
+        if kept is not None and same_scene(kept[0], scene):
+            return kept[1]
+        part = None if kept is None else changed_part(kept[0], scene, view)
+        if kept is None or part is None:
+            picture = draw(scene, None)
+        else:
+            picture, (x0, y0, x1, y1) = kept[1], part
+            if x0 < x1 and y0 < y1:
+                picture[y0:y1, x0:x1] = draw(scene, part)
+        self._pictures[name] = (scene, picture)
+        return picture
+
+
+def changed_part(before: Scene, after: Scene, view: ViewState) -> Part | None:
+    """Where two scenes look different that differ in their plate only; None of any others."""
+    old, new = before.plate, after.plate
+    if old is None or new is None or not same_scene(before, replace(after, plate=old)):
+        return None
+    if old.box != new.box or old.pixels.dtype != new.pixels.dtype:
+        return None
+    starts = range(0, len(old.pixels), FEW)
+    pairs = ((old.pixels[y : y + FEW], new.pixels[y : y + FEW]) for y in starts)
+    rows = [y for y, (a, b) in zip(starts, pairs, strict=True) if not np.array_equal(a, b)]
+    if not rows:
+        return 0, 0, 0, 0
+    top, bottom = rows[0], rows[-1] + FEW
+    columns = (old.pixels[top:bottom] != new.pixels[top:bottom]).any((0, 2)).nonzero()[0]
+    reach, corner = REACH * max(1 / view.zoom, 1.0), np.array([new.left, new.top])
+    low = corner + (columns[0], top) - reach
+    high = corner + (columns[-1] + 1, bottom) + reach
+    x0, y0, x1, y1 = view.canvas_box(low, high)
+    size = view.width, view.height
+    x0, x1 = (int(np.clip(v, 0, size[0])) for v in (np.floor(x0), np.ceil(x1)))
+    y0, y1 = (int(np.clip(v, 0, size[1])) for v in (np.floor(y0), np.ceil(y1)))
+    return x0, y0, x1, y1
 
 
 def _is_plain(scene: Scene) -> bool:
@@ -325,16 +364,21 @@ class Renderer:
         if not self._is_emulated:
             return None
         return self._still.flat(
-            scene, view, place, lambda under: self._read_canvas(under, view, viewport)
+            scene, view, place, lambda under, part: self._read_canvas(under, view, viewport, part)
         )
 
-    def _read_canvas(self, scene: Scene, view: ViewState, viewport: Viewport) -> U8:
-        """A scene drawn by the shaders, (h, w, 4) u8, upright."""
+    def _read_canvas(
+        self, scene: Scene, view: ViewState, viewport: Viewport, part: Part | None
+    ) -> U8:
+        """A scene drawn by the shaders, (h, w, 4) u8, upright; or only a part of the canvas."""
+        box = viewport if part is None else _part(viewport, part)
         buffer = self._target = self._kept.begin(self._size, self._surround)
+        buffer.scissor = box
         self._draw(scene, view, viewport)
+        buffer.scissor = (0, 0, self._size[0], self._size[1])
         self._target = self._context.screen
-        data = buffer.read(viewport=viewport, components=4, alignment=1)
-        return np.frombuffer(data, np.uint8).reshape(view.height, view.width, 4)[::-1].copy()
+        data = buffer.read(viewport=box, components=4, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(box[3], box[2], 4)[::-1].copy()
 
     def _draw(self, scene: Scene, view: ViewState, viewport: Viewport) -> None:
         """Into the target."""

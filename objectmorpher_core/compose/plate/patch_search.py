@@ -24,7 +24,7 @@ MOST_BESIDE = 4.0  # px: farther is no worse
 HINT_COST = 20_000.0  # squared levels of 255, for a source that a hint does not offer
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
 def patch_cost(target, weight, layers, place, source, size, limit):
     """Weighted sum of squares of the patches at `place` and `source`; stops beyond `limit`.
 
@@ -47,19 +47,21 @@ def patch_cost(target, weight, layers, place, source, size, limit):
     return total
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _penalty(wanted, offered, barred, source):
-    """What a source costs whatever it looks like, per unit of a patch's weight."""
-    penalty = barred[source]
-    if wanted[0] > 0:
+@numba.njit(fastmath=True, inline="always")
+def _penalty(wanted, row, column, offered, barred, source):
+    """What a source costs at a place, whatever it looks like, per unit of a patch's weight."""
+    k, i, j = source
+    penalty = barred[k, i, j]
+    if wanted[row, column, 0] > 0:
         gap = MOST_BESIDE
-        if offered[source][0] == wanted[0]:
-            gap = min(abs(offered[source][1] - wanted[1]), MOST_BESIDE)
+        if offered[k, i, j, 0] == wanted[row, column, 0]:
+            gap = min(abs(offered[k, i, j, 1] - wanted[row, column, 1]), MOST_BESIDE)
         penalty += LINE_COST * gap * gap
-    if wanted[2] > 0 and (np.int64(wanted[2]) & np.int64(offered[source][2])) == 0:
+    hints = np.int64(wanted[row, column, 2])
+    if wanted[row, column, 2] > 0 and (hints & np.int64(offered[k, i, j, 2])) == 0:
         penalty += HINT_COST
-    if len(wanted) > 3:  # there are regions
-        penalty += wanted[3 + np.int64(offered[source][3])]
+    if wanted.shape[2] > 3:  # there are regions
+        penalty += wanted[row, column, 3 + np.int64(offered[k, i, j, 3])]
     return np.float32(penalty)
 
 
@@ -79,7 +81,7 @@ def _begin(pictures, wanted, offered, barred, targets, sources, costs):
         first, end = column * channels, (column + size) * channels
         weights[n] = weight[row : row + size, first:end:channels].sum()
         source = (sources[row, column, 0], sources[row, column, 1], sources[row, column, 2])
-        costs[row, column] = weights[n] * _penalty(wanted[row, column], offered, barred, source)
+        costs[row, column] = weights[n] * _penalty(wanted, row, column, offered, barred, source)
         place = (row, column, channels)
         costs[row, column] += patch_cost(target, weight, layers, place, source, size, NEVER)
     return weights, size, channels
@@ -120,11 +122,14 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, r
                 attempt += 1
                 if not (0 <= i < height and 0 <= j < width):
                     continue
-                own = sources[row, column]
-                if k == own[0] and i == own[1] and j == own[2]:
+                if (
+                    k == sources[row, column, 0]
+                    and i == sources[row, column, 1]
+                    and j == sources[row, column, 2]
+                ):
                     continue  # near the end most of what neighbours say is what it has
                 source = (k, i, j)
-                cost = weights[n] * _penalty(wanted[row, column], offered, barred, source)
+                cost = weights[n] * _penalty(wanted, row, column, offered, barred, source)
                 if cost >= best:
                     continue
                 place = (row, column, channels)

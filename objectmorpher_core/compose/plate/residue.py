@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
 from ...base.masks import box_of, disc
+from ...base.threads import core_count
 from ...document.model import Document, EditObject, Matte, Placement, Plate
 from ...document.placement import is_in_place
 from ...document.settings import GAMMA
@@ -200,7 +201,8 @@ class _Surroundings:
         seeds = _some(np.argwhere(self._ring), SEEDS, random)
         probes = _some(seeds, PROBES, random)
         tree = KDTree(features[seeds[:, 0], seeds[:, 1]])
-        costs, which = tree.query(features[probes[:, 0], probes[:, 1]], k=NEIGHBOURS)
+        here = features[probes[:, 0], probes[:, 1]]
+        costs, which = tree.query(here, k=NEIGHBOURS, workers=core_count())
         gaps = np.linalg.norm(seeds[which] - probes[:, None], axis=-1)
         costs = np.where(gaps > APART * self._reach, costs, np.inf).min(1)
         is_known = np.isfinite(costs)
@@ -209,7 +211,8 @@ class _Surroundings:
         around = KDTree(probes).query(places, k=min(NEIGHBOURS, len(probes)))[1]
         limit = look.factor * np.quantile(costs[around], USUAL, axis=1) + look.floor
         result = np.zeros_like(self._band)
-        result[self._band] = tree.query(features[places[:, 0], places[:, 1]])[0] > limit
+        here = features[places[:, 0], places[:, 1]]
+        result[self._band] = tree.query(here, workers=core_count())[0] > limit
         return result
 
     def _attached(self, part: Mask, is_shadow: bool) -> Mask:

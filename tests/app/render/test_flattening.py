@@ -157,3 +157,30 @@ def test_another_background_is_seen_at_once(renderer, monkeypatch, scene: Scene)
     other = replace(scene, plate=replace(scene.plate, pixels=255 - scene.plate.pixels))
     flat, drawn, _ = _both(renderer, monkeypatch, other, view)
     assert np.abs(flat - drawn).max() <= ROUNDED
+
+
+@pytest.mark.parametrize("zoom", [0.3, 0.7, 1.0, 1.9, 4.0])
+def test_of_another_background_only_what_is_different_is_drawn(
+    renderer, monkeypatch, scene: Scene, zoom: float
+) -> None:
+    """It looks, byte for byte, as if all of it had been drawn."""
+    from objectmorpher.render.renderer import StillView
+
+    parts, read = [], renderer._read_canvas
+    monkeypatch.setattr(renderer, "_read_canvas", lambda *a: parts.append(a[-1]) or read(*a))
+    plate, view, random = scene.plate, _view(zoom), np.random.default_rng(3)
+    assert plate is not None
+    others, changed = [], []
+    _shown(renderer, scene, view, True)
+    for _ in range(6):
+        (x, y), (w, h) = random.integers(0, (44, 34)), random.integers(1, 7, 2)
+        pixels = plate.pixels.copy()
+        pixels[y : y + h, x : x + w] = random.integers(0, 255, (h, w, 3))
+        others.append(replace(scene, plate=replace(plate, pixels=pixels)))
+        renderer.draw(others[-1], view, VIEWPORT)
+        changed.append(renderer.read(SIZE))
+    assert parts.count(None) == 2, "the photo, and the first background"
+    for other, shown in zip(others, changed, strict=True):
+        renderer._still = StillView()
+        assert np.array_equal(shown, _shown(renderer, other, view, True))
+    assert len({shown.tobytes() for shown in changed}) > 3, "they can be told apart"

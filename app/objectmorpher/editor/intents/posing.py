@@ -385,14 +385,23 @@ class HandleNumbers:
     def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor = editor
         self._posing = posing
+        self._read: tuple[Document, int, int, Numbers] | None = None  # of what, and what it was
 
     def read(self) -> Numbers | None:
+        """Return them: the panel asks for them, and the ring."""
         editor = self._editor
-        h = self._posing.handle
+        h, k = self._posing.handle, editor.current
         if h is None or editor.object is None or editor.document is None:
             return None
-        handle, spot = editor.object.handles[h], self._posing.spot(h)
-        rest = editor.derived.spot(editor.document, editor.current, handle.point)
+        last = self._read
+        if last is None or last[0] is not editor.document or last[1:3] != (k, h):
+            self._read = last = editor.document, k, h, self._read_anew(editor.document, h)
+        return last[3]
+
+    def _read_anew(self, document: Document, h: int) -> Numbers:
+        editor = self._editor
+        handle, spot = editor.chosen.handles[h], self._posing.spot(h)
+        rest = editor.derived.spot(document, editor.current, handle.point)
         return Numbers(
             float(spot.xy[0]), float(spot.xy[1]), (spot.depth - rest.depth) / spot.diameter,
             np.degrees(self._roll(h)), handle.softness, handle.is_pin, handle.turn is None,

@@ -102,9 +102,13 @@ class CanvasPainter:
         self.draw.add_ngon_filled(at, outer, theme.u32(DARK, 0.8 * alpha), 4)
         self.draw.add_ngon_filled(at, theme.pt(radius), theme.u32(fill, alpha), 4)
 
-    def hollow_diamond(self, at: ImVec2, radius: float) -> None:
-        self.draw.add_ngon(at, theme.pt(radius), theme.u32(DARK, 0.5), 4, theme.pt(3))
-        self.draw.add_ngon(at, theme.pt(radius), theme.u32(WHITE, 0.6), 4, theme.pt(1.4))
+    def hollow_diamonds(self, places: list[ImVec2], radius: float) -> None:
+        """Many of them, and in every frame."""
+        reach, wide, narrow = theme.pt(radius), theme.pt(3), theme.pt(1.4)
+        dark, white, draw = theme.u32(DARK, 0.5), theme.u32(WHITE, 0.6), self.draw
+        for at in places:
+            draw.add_ngon(at, reach, dark, 4, wide)
+            draw.add_ngon(at, reach, white, 4, narrow)
 
     def square(self, at: ImVec2, half: float, fill: str) -> None:
         for grow, color in ((1.5, theme.u32(DARK, 0.8)), (0.0, theme.u32(fill))):

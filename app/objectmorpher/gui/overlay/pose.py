@@ -62,8 +62,8 @@ def _draw_handles(canvas: CanvasPainter, thing: EditObject) -> None:
     document = editor.opened
     pose = editor.view.pose
     if pose.has_anchors:
-        for at in _apart(canvas.on_photo(editor.derived.anchors(document, editor.current))):
-            canvas.hollow_diamond(at, 4)
+        anchors = editor.derived.anchors(document, editor.current)
+        canvas.hollow_diamonds(_apart(canvas.on_photo(anchors)), 4)
     rests = np.array([h.point for h in thing.handles])
     starts = canvas.at(editor.derived.project(document, editor.current, rests))
     ends = canvas.at(editor.posing.positions())
@@ -87,10 +87,17 @@ def _apart(places: list[ImVec2], points: float = APART) -> list[ImVec2]:
         i, j = int(at.x // least), int(at.y // least)
         if (i, j) in cells:
             continue
-        near = (cells.get((i + a, j + b)) for a in (-1, 0, 1) for b in (-1, 0, 1))
-        if all(n is None or math.hypot(at.x - n.x, at.y - n.y) >= least for n in near):
+        near = [cells[cell] for cell in _around(i, j) if cell in cells]
+        if all(math.hypot(at.x - n.x, at.y - n.y) >= least for n in near):
             cells[i, j] = at
     return list(cells.values())
+
+
+def _around(i: int, j: int) -> tuple[tuple[int, int], ...]:
+    return (
+        (i - 1, j - 1), (i - 1, j), (i - 1, j + 1), (i, j - 1),
+        (i, j + 1), (i + 1, j - 1), (i + 1, j), (i + 1, j + 1),
+    )  # fmt: skip
 
 
 def _draw_mirror(canvas: CanvasPainter) -> None:
