@@ -12,10 +12,9 @@ from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.view import Popup, PoseMode, Shown, ToolName
 from ...system.texts import t
-from ..overlay.canvas import CanvasPainter
+from ..overlay.canvas import CanvasPainter, draw_comparison, draw_look, draw_pixel_grid
 from ..overlay.compose import draw_compose
 from ..overlay.legend import Legend
-from ..overlay.look import draw_comparison, draw_look, draw_pixel_grid
 from ..overlay.place import draw_frame
 from ..overlay.pose import draw_control_points, draw_pose
 from ..overlay.select import draw_left_out, draw_mask, draw_selection
