@@ -17,6 +17,8 @@ PIP := $(PYTHON) -m pip --disable-pip-version-check
 COMPILE := $(PYTHON) -m compileall -q -j 0 app objectmorpher_core research tests
 # The kernels, before processes that begin together compile the same ones.
 KERNELS := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m tests.kernels
+# The tests' assertions, for the same reason.
+REWRITTEN := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m tests.rewritten
 # Of what tests need, Python compiles what they import when they do: a third of it.
 INSTALL := $(PIP) install --no-compile
 PHOTO ?=
@@ -103,8 +105,16 @@ test-browser: .make/browser
 	$(PYTHON) -m objectmorpher.system.warm_up
 	touch $@
 
+# The kernels are compiled while what only the tests need is installed.
 .make/test: .make/venv pyproject.toml research/pyproject.toml
 	@echo "Installing ObjectMorpher and its test tools into .venv (minutes, the first time)"
+	if [ -n "$(LOCK)" ]; then
+	    $(INSTALL) --progress-bar on --require-hashes -r packaging/locks/run-time.txt
+	else
+	    $(INSTALL) --progress-bar on -e .
+	fi
+	$(KERNELS) &
+	compiling=$$!
 	if [ -n "$(LOCK)" ]; then $(INSTALL) --progress-bar on --require-hashes -r "$(LOCK)"; fi
 	$(INSTALL) --progress-bar on -e '.[dev]' -e research
 	$(APT)
@@ -113,13 +123,16 @@ test-browser: .make/browser
 	$(PYTHON) -c 'import ctypes; ctypes.CDLL("libEGL.so.1")' 2>/dev/null || missing+=(libegl1)
 	command -v Xvfb >/dev/null || missing+=(xvfb)
 	command -v xdotool >/dev/null || missing+=(xdotool)
+	made=(.make/run $@)  # the editor needs less than its tests
 	if [ "$$(uname)" = Linux ] && [ $${#missing[@]} -gt 0 ]; then
 	    apt_install "$${missing[@]}" || {
 	        echo "The tests that draw need these system packages, and are skipped without them: $${missing[*]}"
-	        exit 0  # no stamp: looked for again next time
+	        made=()  # looked for again next time
 	    }
 	fi
-	touch .make/run $@  # the editor needs less than its tests
+	$(REWRITTEN)
+	wait $$compiling || true  # the tests compile what is missing, and say why they cannot
+	[ $${#made[@]} = 0 ] || touch "$${made[@]}"
 
 # The environment, made by the first Python that is new enough.
 .make/venv:

@@ -15,7 +15,7 @@ files=()
 status=0
 for system in "${@:-Windows Darwin Linux}"; do
     for one in $system; do
-        errors=$(.venv/bin/pyright --threads 2 --pythonplatform "$one" "${files[@]}" |
+        errors=$(.venv/bin/pyright --pythonplatform "$one" "${files[@]}" |
             grep -E " error: " | grep -v -E "could not be resolved \(reportMissing" || true)
         if [ -n "$errors" ]; then
             echo "$one:"

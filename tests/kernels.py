@@ -9,10 +9,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from tests.alone import alone
-from tests.tree import PYTHONPATH, ROOT
 
+ROOT = Path(__file__).parents[1]
+PYTHONPATH = os.pathsep.join([str(ROOT / "app"), str(ROOT)])
 FOLDERS = (ROOT / "objectmorpher_core", ROOT / "app" / "objectmorpher")
 KEPT = ROOT / ".pytest_cache" / "kernels.txt"
 

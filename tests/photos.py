@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,7 @@ OTHERS = ("motorcycle", "camera", "coins")  # the last two are grey
 def photo(name: str) -> np.ndarray:
     """One of NAMES or OTHERS as (H, W, 3) u8 RGB, read-only."""
     if name in ("flower", "china"):
-        from sklearn.datasets import load_sample_image
-
-        pixels = load_sample_image(f"{name}.jpg")
+        pixels = _of_scikit_learn(name)
     elif name == "motorcycle":
         pixels = _motorcycle()
     else:
@@ -46,6 +45,16 @@ def outlined(name: str) -> np.ndarray:
 
     path = Path(__file__).parent / "core" / "segment" / "truth" / f"{name}.png"
     return np.array(Image.open(path).convert("L")) > 127
+
+
+def _of_scikit_learn(name: str) -> np.ndarray:
+    """Read from its folder: to import it takes two seconds."""
+    from PIL import Image
+
+    found = find_spec("sklearn")
+    assert found is not None and found.submodule_search_locations
+    folder = Path(found.submodule_search_locations[0], "datasets", "images")
+    return np.array(Image.open(folder / f"{name}.jpg"))
 
 
 def _motorcycle() -> np.ndarray:

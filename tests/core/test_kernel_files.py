@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 import os
 import re
 import subprocess
@@ -11,7 +12,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from numba.core import caching
+import numba
+import pytest
+from numba.core import caching, event
+from numba.core.errors import TypingError
 
 from objectmorpher_core import warm_up
 from objectmorpher_core.base import kernel_files  # noqa: F401  (names the files)
@@ -38,6 +42,49 @@ def test_two_processes_that_write_at_once_leave_no_wrong_kernel(tmp_path: Path) 
     found = Files(str(tmp_path), "blend", 1)
     assert all(found.load(key) in (None, key) for key in KEYS)
     assert any(found.load(key) == key for key in KEYS)
+
+
+class Seen(event.Listener):
+    """Whether garbage would be looked for where a kernel begins to be compiled."""
+
+    def __init__(self) -> None:
+        self.states: list[bool] = []
+
+    def on_start(self, event: Any) -> None:
+        self.states.append(gc.isenabled())
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def test_no_garbage_is_looked_for_while_kernels_are_compiled_and_again_afterwards() -> None:
+    """Also what one calls, and where one cannot be compiled; who has turned it off finds it so."""
+
+    @numba.njit
+    def half(one: float) -> float:
+        return one / 2
+
+    def both(one: float, other: float) -> float:
+        return half(one) + half(other) + float(half(int(one)))
+
+    def refused(one: float) -> float:
+        return one.is_unknown  # pyright: ignore[reportAttributeAccessIssue]
+
+    seen = Seen()
+    event.register("numba:compile", seen)
+    try:
+        assert numba.njit(both)(3.0, 2.0) == 4.0
+        assert gc.isenabled()
+        with pytest.raises(TypingError):
+            numba.njit(refused)(1.0)
+        assert gc.isenabled()
+        gc.disable()
+        numba.njit(both)(3.0, 2.0)
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
+        event.unregister("numba:compile", seen)
+    assert len(seen.states) > 5 and not any(seen.states)
 
 
 ASKED_TWICE = """

@@ -53,8 +53,8 @@ class Relit:
 
         `alpha` (h, w).
         """
-        out = np.empty_like(colour)
-        inputs = colour, alpha, *self._places(alpha.shape, left, top, 1.0), out
+        out, whole = np.array(colour, order="C"), np.ascontiguousarray(alpha)
+        inputs = whole, *self._places(alpha.shape, left, top, 1.0), out
         in_threads(lambda a, b: _multiply(a, b, *inputs), len(out), 2, LEAST_ROWS)
         return out
 
@@ -77,14 +77,14 @@ class Relit:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _multiply(first, last, colour, alpha, factor, rows, down, columns, across, out):
-    """The rows first..last of `out`: `colour` times one more than `factor`."""
+def _multiply(first, last, alpha, factor, rows, down, columns, across, out):
+    """Multiplies the rows first..last of `out` by one more than `factor`."""
     gains, line = np.empty(len(columns), np.float32), np.empty(factor.shape[1], np.float32)
     for y in range(first, last):
         _find_gains(factor[rows[y]], factor[rows[y] + 1], down[y], columns, across, line, gains)
         for x in range(len(columns)):
             for c in range(3):
-                out[y, x, c] = min(colour[y, x, c] * gains[x], alpha[y, x])
+                out[y, x, c] = min(out[y, x, c] * gains[x], alpha[y, x])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)

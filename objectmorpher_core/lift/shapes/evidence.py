@@ -125,13 +125,18 @@ class Evidence:
         extent = float(max(x1 - x0, y1 - y0))
         shape = mask[own, own].shape
         grid = RayGrid((low[0], low[1]), STRIDE * width / side, (shape[0], shape[1]))
+
+        def own_of(part: np.ndarray) -> np.ndarray:
+            """Contiguous, as `within` makes masks: else `_compared` is compiled twice, 4 s each."""
+            return np.ascontiguousarray(part[own, own])
+
         return Evidence(
-            grid, mask[own, own], (inside > INNER)[own, own],
-            np.where(mask, inside - 0.5, outside - 0.5)[own, own].astype(np.float64),
-            (distance * ways[..., 2])[own, own], error[own, own],
-            seen.normal.astype(np.float64)[own, own], ways[own, own],
-            (seen.depth * ways[..., 2])[own, own],
-            np.maximum(seen.depth_error.astype(np.float64), LEAST_ERROR)[own, own],
+            grid, own_of(mask), own_of(inside > INNER),
+            own_of(np.where(mask, inside - 0.5, outside - 0.5).astype(np.float64)),
+            own_of(distance * ways[..., 2]), own_of(error),
+            own_of(seen.normal.astype(np.float64)), own_of(ways),
+            own_of(seen.depth * ways[..., 2]),
+            own_of(np.maximum(seen.depth_error.astype(np.float64), LEAST_ERROR)),
             extent, mask,
         )  # fmt: skip
 

@@ -9,7 +9,14 @@ import pytest
 
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import ABOVE, estimate_light
-from objectmorpher_core.compose.light.relight import LEAST, MOST, Relit, relight, turned_normals
+from objectmorpher_core.compose.light.relight import (
+    LEAST,
+    MOST,
+    Relit,
+    _multiply,
+    relight,
+    turned_normals,
+)
 from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
@@ -183,6 +190,25 @@ def test_the_same_light_on_numbers_and_on_bytes():
     assert np.abs(shown[..., :3] - 255 * lit).max() <= 1
     larger = relit.lit_rgba(rgba, 5, 2, 2.0)  # half as many px of the photo
     assert np.abs(larger.astype(int) - shown).max() > 3
+
+
+def test_a_part_of_a_picture_gets_the_same_and_stays_as_it_was():
+    """Whatever lies in memory how; the kernel is compiled for one kind of arrays."""
+    rng = np.random.default_rng(4)
+    factor = rng.uniform(LEAST, MOST, (9, 12)).astype(np.float32) - 1
+    alpha = rng.uniform(0.2, 1, (60, 80)).astype(np.float32)
+    colour = alpha[..., None] * rng.uniform(0, 1, (60, 80, 3)).astype(np.float32)
+    before = colour.copy()
+    relit = Relit(factor, 1.5, -2.0, 7.5)
+    whole = relit.lit(colour, alpha, 0, 0)
+    assert (whole != colour).mean() > 0.5
+    colour.setflags(write=False)
+    np.testing.assert_array_equal(relit.lit(colour, alpha, 0, 0), whole)
+    part = relit.lit(colour[:, :50], alpha[:, :50], 0, 0)
+    np.testing.assert_array_equal(part, whole[:, :50])
+    np.testing.assert_array_equal(relit.lit(colour[:, :50].copy(), alpha[:, :50], 0, 0), part)
+    np.testing.assert_array_equal(colour, before)
+    assert len(_multiply.signatures) == 1
 
 
 def test_a_session_keeps_it_and_nonsense_is_refused():

@@ -18,6 +18,7 @@ from objectmorpher_core.lift.crop import Crop
 from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.shapes import completed, recognised, rod_look
+from objectmorpher_core.lift.shapes.evidence import Evidence
 from objectmorpher_core.lift.shapes.rods import RodView
 from objectmorpher_core.lift.shapes.solids import Mesh, RayGrid, drawn, revolved, tube
 from objectmorpher_core.models import registry
@@ -86,6 +87,16 @@ def test_of_which_the_azimuth_is_unknown_stays_as_it_was() -> None:
     )
     assert np.array_equal(before.middle, after.middle)
     assert np.array_equal(before.front.square, after.front.square)
+
+
+def test_fields_are_contiguous_with_the_handle_and_without() -> None:
+    """For other arrays the misfit's kernel is compiled anew, which takes seconds."""
+    whole = Evidence.of(see(mug(0.3, 1))[0])
+    core = whole.core()
+    assert core.mask.sum() < whole.mask.sum()
+    for one in (whole, core):
+        fields = [value for value in vars(one).values() if isinstance(value, np.ndarray)]
+        assert len(fields) == 10 and all(field.flags.c_contiguous for field in fields)
 
 
 @pytest.mark.parametrize("corner", [(400.0, -90.0), (-90.0, 400.0), (30.0, 40.0)])
