@@ -26,7 +26,9 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "howto").glob("*.md"))]
 RUN = ("edit", "select", "replay", "convert", "batch", "share")
 # A shadow that goes along, and a turn that shows much of what is invented.
-EXPECTED = re.compile(r"goes along with it|is removed|is guesswork|look closely")
+EXPECTED = re.compile(  # what is erased beside an object is looked for among chosen places
+    r"goes along with it|is removed|is guesswork|look closely|look like part of it and are erased"
+)
 PICTURES = 10  # of each film, in place of 25 a second
 TWO = {
     "photo": "flower.jpg", "click": [[300, 190]], "move": [-60, 0],
