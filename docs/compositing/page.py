@@ -123,7 +123,10 @@ else; four in ten have no shadow of the thing. No solid and no scene on this pag
 nor any photograph of the half below that was held out; parts of those of the other half were, as
 grounds and backgrounds, the cup's photo among them. Where the network sees shade says which of
 the shadows that were tried it is, and how sure it is decides whether there is one, but for a
-silhouette that explains so much that it is certain by itself.
+silhouette that explains so much that it is certain by itself. It looks four times: at what is
+there and at its mirror image, and at both 1.6 times as large; the mean is how sure it is. One
+look found 72 of the 185 below (39 %), of those visible in principle 48 of 80 (60 %), and the window
+offered 102, where equally many were imagined.
 
 Whether anything is imagined is asked of 1,000 scenes (`python docs/compositing/imagined.py`):
 solids and upright pictures on photographed and drawn grounds, with walls, neighbours, edges of

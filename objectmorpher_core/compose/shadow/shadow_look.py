@@ -21,6 +21,7 @@ CELLS = 2 * THING  # of that side on the grid that it is given
 PLANES = 5
 SEEN = 0.02  # of a cell, that the thing covers where it is looked at
 MOSTLY = 0.75  # of a cell that is ground
+CLOSER = 1.6  # x as large as that, the thing is looked at again
 BRIGHT, COLOUR = 3.0, 1.5  # natural logarithms, beyond which nothing is told apart
 
 
@@ -51,16 +52,33 @@ def planes_of(brightness: F32, colour: F32, cover: F32, free: Mask) -> F32:
 def look_for_shadow(brightness: F32, colour: F32, cover: F32, free: Mask) -> SeenShadow:
     """Look at surroundings (h, w) on a grid in whose middle the thing is, CELLS long.
 
-    The fields are those of `planes_of`. The answer is on the same grid.
+    The fields are those of `planes_of`. The answer is on the same grid: the mean of what is seen
+    in them and in their mirror image, the odds also of what is seen of both from nearer.
     """
-    parts = (brightness, colour, cover, free.astype(np.float32))
-    small = [_shrunk(part) for part in parts]
-    planes = planes_of(small[0], small[1], small[2], small[3] > MOSTLY)
+    fields = brightness, colour, cover, free.astype(np.float32)
+    mirrored = tuple(np.ascontiguousarray(field[:, ::-1]) for field in fields)
+    own, other = _look(fields), _look(mirrored)
+    nearer = [_look(tuple(_enlarged(field) for field in view)) for view in (fields, mirrored)]
+    odds = np.mean([seen.odds for seen in (own, other, *nearer)])
+    return SeenShadow(0.5 * (own.shade + other.shade[:, ::-1]), float(odds))
+
+
+def _look(fields: tuple[F32, ...]) -> SeenShadow:
+    """One look at the fields of `look_for_shadow`."""
+    light, colour, cover, free = (_shrunk(field) for field in fields)
+    planes = planes_of(light, colour, cover, free > MOSTLY)
     shade, odds = _session().run(None, {"planes": planes[None]})
     chance = 1 / (1 + np.exp(-np.asarray(shade[0], np.float32)))
     whole = cv2.resize(chance, (2 * SIDE, 2 * SIDE), interpolation=cv2.INTER_LINEAR)
-    shade_there = _middle(np.asarray(whole, np.float32), *brightness.shape)
+    shade_there = _middle(np.asarray(whole, np.float32), *fields[0].shape)
     return SeenShadow(shade_there, float(odds[0]))
+
+
+def _enlarged(field: F32) -> F32:
+    """A field (h, w) or (h, w, n), so much larger that it is seen from nearer."""
+    height, width = field.shape[:2]
+    size = round(CLOSER * width), round(CLOSER * height)
+    return np.asarray(cv2.resize(field, size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 @cache
