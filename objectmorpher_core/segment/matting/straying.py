@@ -193,10 +193,10 @@ def _sized(mask: Mask, size: tuple[int, ...]) -> Mask:
 
 def _beside_edge(rgb: RGB, mask: Mask, off: float) -> list[Mask]:
     """The pieces (h, w) between a mask's outline and the edge, at most `off` px away."""
-    found = _wide(rgb, mask, off)
     picture = rgb.astype(np.float32) / np.float32(255)
+    found = _wide(picture, mask, off)
     lab = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2LAB), np.float32) / np.float32(100)
-    contrast, far = _contrast(lab), int(BESIDE_PIECE * off)
+    contrast, far = _contrast(lab), max(int(BESIDE_PIECE * off), 1)
     differs = cv2.morphologyEx(
         (found != mask).astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8)
     )
@@ -215,13 +215,12 @@ def _beside_edge(rgb: RGB, mask: Mask, off: float) -> list[Mask]:
     return pieces
 
 
-def _wide(rgb: RGB, mask: Mask, off: float) -> Mask:
-    """(h, w) the matte of a band `off` px wide about a mask's outline, where it is above half."""
+def _wide(picture: F32, mask: Mask, off: float) -> Mask:
+    """(h, w) where the matte of a band of `off` px about a mask's outline is above half."""
     unknown = ~(core(mask, off, LIMB) | core(~mask, off, LIMB))
     known = mask.astype(np.float32)
     start = np.where(unknown, cv2.GaussianBlur(known, (0, 0), off / 2), known)
     expected = Expected(known, np.full(mask.shape, OUTLINE, np.float32))
-    picture = rgb.astype(np.float32) / np.float32(255)
     alpha = solve_alpha(picture, unknown, expected, start.astype(np.float32), OUTLINE_ROUNDS)
     return np.asarray(alpha > 0.5, np.bool_)
 
