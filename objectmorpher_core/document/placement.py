@@ -222,9 +222,9 @@ def grown(placement: Placement, scale: float, item: EditObject, document: Docume
 
 
 def is_in_place(item: EditObject, document: Document) -> bool:
-    """Whether it is as large as in the photo, and its foot is where it is there, however turned.
+    """Whether it is as large as in the photo, and its foot or centre is where it is there.
 
-    What flies is where its centre is. A place that is computed from a matrix is off by rounding.
+    It may be turned about either. A place that is computed from a matrix is off by rounding.
     """
     placement, lifted = item.placement, item.lifted
     if abs(placement.scale - 1) > STILL:
@@ -234,9 +234,10 @@ def is_in_place(item: EditObject, document: Document) -> bool:
     if lifted is None:
         return False
     foot = _foot(lifted, gimbal_of(item, document).down)
+    still = np.stack([foot, lifted.centre])
     motion = placement.matrix(lifted, document.photo.camera)
-    off = np.linalg.norm(motion[:3, :3] @ foot + motion[:3, 3] - foot)
-    return bool(off < STILL * lifted.diameter * lifted.scale)
+    off = np.linalg.norm(still @ motion[:3, :3].T + motion[:3, 3] - still, axis=1)
+    return bool(off.min() < STILL * lifted.diameter * lifted.scale)
 
 
 _FEET: WeakKeyDictionary[LiftedObject, tuple[np.ndarray, F64]] = WeakKeyDictionary()

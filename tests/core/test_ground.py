@@ -199,13 +199,14 @@ def test_a_place_is_in_place_whatever_the_rounding_of_how_it_was_computed(scene,
     thing = replace(document.objects[0], lifted=lifted)
     down = gimbal_of(thing, document).down
     for turn in ((20.0, 0.0, 0.0), (-31.0, 7.0, 3.0)):
-        place = turned(Placement(), turn, _points(scene), lifted, camera, down)
-        for off, is_still in ((0.0, True), (1e-9, True), (0.05, False)):
-            motion = place.matrix(lifted, camera)
-            motion[:3, :3] *= 1 + off
-            motion[:3, 3] += lifted.diameter * off
-            computed = replace(thing, placement=placement_of(motion, lifted, camera))
-            assert is_in_place(computed, document) == is_still, (turn, off)
+        about_its_foot = turned(Placement(), turn, _points(scene), lifted, camera, down)
+        for place in (about_its_foot, Placement(turn=turn)):
+            for off, is_still in ((0.0, True), (1e-9, True), (0.05, False)):
+                motion = place.matrix(lifted, camera)
+                motion[:3, :3] *= 1 + off
+                motion[:3, 3] += lifted.diameter * off
+                computed = replace(thing, placement=placement_of(motion, lifted, camera))
+                assert is_in_place(computed, document) == is_still, (place, off)
 
 
 UPS = [(0.0, -1.0, 0.0), (0.1, -0.6, -float(np.sqrt(1 - 0.37)))]
