@@ -33,8 +33,10 @@ ENDS = 0.85  # x reach: what goes on to here is background
 AROUND = 2.4  # x reach: the background that a place is compared with
 SIDE = 420.0  # px: size of the picture in which residue is looked for
 LEAST_REACH = 12.0  # px of that picture
-SEEDS, PROBES = 12_000, 3_000  # places of the background, and those on which it is measured
-NEIGHBOURS = 60
+LATTICE = 8.0  # places of the background in a reach: those on which it is measured, all alike
+NEIGHBOURS, MANY = 60, 12_000  # so many of the background's places, or of so many, are compared
+NEAREST_SHARE = 0.02  # of the places on which it is measured: those around one of the band
+COARSE = 4  # px of that picture, between places around which that is taken
 APART = 0.4  # x reach: a place of the background is compared with others that are so far off
 STEEP = 6.0  # levels of CIE Lab that a background as far off as the reach costs
 USUAL = 0.9  # quantile of what the background costs around a place
@@ -197,23 +199,47 @@ class _Surroundings:
         rows, columns = np.indices(self._band.shape, np.float32) * (STEEP / self._reach)
         colours = [weight * self._blurred(sigma) for sigma, weight in look.blurs]
         features = np.dstack([*colours, rows, columns])
-        random = np.random.default_rng(0)
-        seeds = _some(np.argwhere(self._ring), SEEDS, random)
-        probes = _some(seeds, PROBES, random)
-        tree = KDTree(features[seeds[:, 0], seeds[:, 1]])
-        here = features[probes[:, 0], probes[:, 1]]
-        costs, which = tree.query(here, k=NEIGHBOURS, workers=core_count())
-        gaps = np.linalg.norm(seeds[which] - probes[:, None], axis=-1)
+        tree = KDTree(features[self._ring])
+        limit = look.factor * self._own_costs(features) + look.floor
+        result = np.zeros_like(self._band)
+        result[self._band] = tree.query(features[self._band], workers=core_count())[0] > limit
+        return result
+
+    def _own_costs(self, features: F32) -> F64:
+        """(N,) what the background around each place of the band usually costs itself.
+
+        A place whose like is all close by counts as the dearest.
+        """
+        lattice = np.zeros_like(self._ring)
+        lattice[(np.s_[:: max(int(self._reach / LATTICE), 1)],) * 2] = True
+        there = self._ring & lattice
+        if np.count_nonzero(there) <= NEIGHBOURS:
+            there = self._ring
+        probes, here = np.argwhere(there), features[there]
+        alike = max(round(len(probes) * NEIGHBOURS / min(self._ring.sum(), MANY)), 2)
+        costs, which = KDTree(here).query(here, k=alike, workers=core_count())
+        gaps = np.linalg.norm(probes[which] - probes[:, None], axis=-1)
         costs = np.where(gaps > APART * self._reach, costs, np.inf).min(1)
         is_known = np.isfinite(costs)
         costs[~is_known] = costs[is_known].max(initial=0.0)
-        places = np.argwhere(self._band)
-        around = KDTree(probes).query(places, k=min(NEIGHBOURS, len(probes)))[1]
-        limit = look.factor * np.quantile(costs[around], USUAL, axis=1) + look.floor
-        result = np.zeros_like(self._band)
-        here = features[places[:, 0], places[:, 1]]
-        result[self._band] = tree.query(here, workers=core_count())[0] > limit
-        return result
+        return self._around(costs, probes)
+
+    def _around(self, costs: F64, probes: I64) -> F64:
+        """(N,) the usual one of the `costs` of the `probes` nearest to each place of the band."""
+        height, width = self._band.shape
+        rows, columns = np.arange(0, height + COARSE, COARSE), np.arange(0, width + COARSE, COARSE)
+        near = cv2.dilate(self._band.view(np.uint8), np.ones((2 * COARSE + 1,) * 2, np.uint8))
+        inner = np.minimum(rows, height - 1)[:, None], np.minimum(columns, width - 1)
+        used = np.argwhere(near[inner] > 0)
+        count = min(max(round(NEAREST_SHARE * len(probes)), NEIGHBOURS), len(probes))
+        which = KDTree(probes).query(used * COARSE, k=count, workers=core_count())[1]
+        grid = np.zeros((len(rows), len(columns)))
+        rank = int(USUAL * (count - 1))
+        grid[tuple(used.T)] = np.partition(costs[which.reshape(-1, count)], rank)[:, rank]
+        y, x = (np.argwhere(self._band) / COARSE).T
+        i, j = y.astype(int), x.astype(int)
+        left, right = (grid[i, n] + (y - i) * (grid[i + 1, n] - grid[i, n]) for n in (j, j + 1))
+        return np.asarray(left + (x - j) * (right - left))
 
     def _attached(self, part: Mask, is_shadow: bool) -> Mask:
         """(h, w) the pieces of `part` that touch what is covered, and end within reach."""
@@ -230,10 +256,6 @@ class _Surroundings:
             keeps &= sums > BELOW * stats[:, cv2.CC_STAT_AREA]
         keeps[0] = False
         return keeps[labels]
-
-
-def _some(places: I64, most: int, random: np.random.Generator) -> I64:
-    return places if len(places) <= most else places[random.choice(len(places), most, False)]
 
 
 def visible_residue(residue: Mask, photo: Pixels, fill: Pixels) -> Mask:
