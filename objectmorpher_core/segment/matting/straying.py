@@ -11,7 +11,7 @@ That leaks as well into a white sleeve before a white wall; so it is believed on
 alone say the same, those of the object well inside that band and of the background well outside,
 and where the mask's outline lies on no edge of the picture; within such an edge all is the
 object's (`strays`). But for gaps between strands that reach that edge: what is there is unlike all
-of the object, and like the background.
+of the object, like the background, a mixture of both, and not the same from strand to strand.
 """
 
 from __future__ import annotations
@@ -45,6 +45,8 @@ ALIKE = 0.02  # sRGB: a colour so far from one that is known may be of it
 LEAST = 11.0  # x band^2: area of what must have changed to be looked at
 FAINT, SEEN_THROUGH = 0.05, 0.3  # alpha that a gap lacks: in each place, and in the mean
 FOREIGN, GROUND = 0.1, 0.25  # sRGB, by which a gap is unlike the object, and like the background
+UNMIXED = 0.07  # sRGB, by which a gap in the mean is no mixture of both
+FINE = 0.115  # alpha, by which it changes over a band's width between strands, in the mean
 AROUND = 2.0  # x band: looked at with it
 
 
@@ -118,16 +120,26 @@ def _gaps(outline: _Outline, change: F32, is_clear: Mask) -> Mask:
     if apart is None:
         return found
 
+    wide = (outline.distance > 0) + change
+    fine = np.abs(wide - cv2.GaussianBlur(wide, (0, 0), outline.band))[is_gap]
+
     def mean(values: F32 | float) -> F32:
         weighed = np.zeros(lost.shape, np.float32)
         weighed[is_gap] = values * lost[is_gap]
         return np.asarray(cv2.GaussianBlur(weighed, (0, 0), over), np.float32)[is_gap]
 
     total = np.maximum(mean(1.0), 1e-6)
-    foreign, ground, through = (mean(values) / total for values in (*apart, lost[is_gap]))
+    foreign, ground, through = (mean(values) / total for values in (*apart.far, lost[is_gap]))
     found[is_gap] = (foreign > FOREIGN) & (ground < GROUND) & (through > SEEN_THROUGH)
-    joined = dilated(found, int(outline.band))
-    return found & _large(joined, np.where(found, lost, 0), least)
+    near = dilated(found, int(outline.band)).view(np.uint8)
+    _, joined = cv2.connectedComponents(near)
+    pieces, share = np.asarray(joined, np.int32)[is_gap], lost[is_gap]
+    pieces = np.where(found[is_gap], pieces, 0)
+    sums = [np.bincount(pieces, share * values) for values in (1.0, fine, apart.unmixed)]
+    lost_in, varied, unmixed = sums[0], *(part / np.maximum(sums[0], 1e-6) for part in sums[1:])
+    is_strands = (lost_in >= least) & (varied > FINE) & (unmixed < UNMIXED)
+    found[is_gap] = is_strands[pieces] & (pieces > 0)
+    return found
 
 
 def _likeness(outline: _Outline, where: Mask, own: Mask) -> F32:
@@ -139,13 +151,20 @@ def _likeness(outline: _Outline, where: Mask, own: Mask) -> F32:
     inside, outside = outline.sides
     apart = _apart(outline, where, (inside | own, outside))
     if apart is not None:
-        near, off = (apart + ALIKE) ** 2
+        near, off = (apart.far + ALIKE) ** 2
         likely[where] = off / (near + off)
     return likely
 
 
-def _apart(outline: _Outline, where: Mask, sides: tuple[Mask, Mask]) -> F32 | None:
-    """(2, n) how far the colours `where` asked are from those nearby of each of the `sides` (h, w).
+class _Apart(NamedTuple):
+    """Colours of a picture beside those nearby of the object and of the background."""
+
+    far: F32  # (2, n) from each
+    unmixed: F32  # (n,) from all mixtures of both
+
+
+def _apart(outline: _Outline, where: Mask, sides: tuple[Mask, Mask]) -> _Apart | None:
+    """How far the colours `where` (h, w) are from those of each of the `sides` (h, w).
 
     None where too few are known of one.
     """
@@ -153,19 +172,27 @@ def _apart(outline: _Outline, where: Mask, sides: tuple[Mask, Mask]) -> F32 | No
     place = np.indices(distance.shape, dtype=np.float32).transpose(1, 2, 0) * (NEAR / reach)
     features = np.concatenate([rgb, place], -1)
     asked = features[where]
-    apart = np.empty((2, len(asked)), np.float32)
+    far = np.empty((2, len(asked)), np.float32)
+    alike = np.empty((2, len(asked), 3), np.float32)
     for side, there in enumerate(sides):
         known = features[there]
         if len(known) < NEIGHBOURS:
             return None
-        tree = KDTree(known[:: -(-len(known) // MOST)])
+        known = known[:: -(-len(known) // MOST)]
+        tree = KDTree(known)
 
-        def look(first: int, last: int, tree: KDTree = tree, side: int = side) -> None:
-            found, _ = tree.query(asked[first:last], k=NEIGHBOURS)
-            apart[side, first:last] = found[:, -1]
+        def look(
+            first: int, last: int, tree: KDTree = tree, side: int = side, known: F32 = known
+        ) -> None:
+            found, which = tree.query(asked[first:last], k=NEIGHBOURS)
+            far[side, first:last] = found[:, -1]
+            alike[side, first:last] = known[np.asarray(which)[:, -1], :3]
 
         in_threads(look, len(asked))
-    return apart
+    line, own = alike[0] - alike[1], asked[:, :3] - alike[1]
+    share = (own * line).sum(1) / np.maximum((line * line).sum(1), 1e-4)
+    off = own - share.clip(0, 1)[:, None] * line
+    return _Apart(far, np.asarray(np.linalg.norm(off, axis=1), np.float32))
 
 
 def _step(rgb: F32, distance: F32, band: float, reach: float) -> F32:
