@@ -73,6 +73,7 @@ DARK = 24.0  # levels of all channels, in which no light is to be measured
 ALONG = 40  # px from a fringe: what has none has edges, where another face begins
 BENT = 2.5  # of its area, by which it may be larger or smaller
 STRIKING = 40.0  # levels, by which what stands out is unlike its surroundings
+USUAL = 0.93  # of an object's surface is its pattern, as a tabby's stripes are, however unlike
 FEATURE = 0.55  # x the root of the object's area: what is longer is a part of it, as a leg is
 SOFT = 5  # px of the photo: a narrower fringe is an edge
 MIX = 2  # px beside a hole that are no texture: they are mixed with it
@@ -479,7 +480,9 @@ def standing_out(levels: F32, where: Mask) -> Mask:
     there = share > 0.5
     small = (own / np.maximum(share, 1e-3)[..., None]).astype(np.float32)
     near, around = (_mean(small, there, sigma / 4) for sigma in (LIKE, 3 * LIKE))
-    striking = (np.linalg.norm(near - around, axis=-1) * there > STRIKING).astype(np.uint8)
+    unlike = np.linalg.norm(near - around, axis=-1)
+    least = max(STRIKING, float(np.quantile(unlike[there], USUAL))) if there.any() else STRIKING
+    striking = (unlike * there > least).astype(np.uint8)
     _, pieces, boxes, _ = cv2.connectedComponentsWithStats(striking)
     longest = np.asarray(boxes)[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(1)
     is_feature = longest < FEATURE * float(np.sqrt(there.sum()))

@@ -10,7 +10,8 @@ Alpha is solved for once more on a small picture, with the edge free to be anywh
 That leaks as well into a white sleeve before a white wall; so it is believed only where colours
 alone say the same, those of the object well inside that band and of the background well outside,
 and where the mask's outline lies on no edge of the picture; within such an edge all is the
-object's (`strays`).
+object's (`strays`). But for gaps between strands that reach that edge: what is there is unlike all
+of the object, like the background, a mixture of both, and not the same from strand to strand.
 """
 
 from __future__ import annotations
@@ -42,6 +43,10 @@ MOST = 2000  # colours of each side
 NEIGHBOURS = 3
 ALIKE = 0.02  # sRGB: a colour so far from one that is known may be of it
 LEAST = 11.0  # x band^2: area of what must have changed to be looked at
+FAINT, SEEN_THROUGH = 0.05, 0.3  # alpha that a gap lacks: in each place, and in the mean
+FOREIGN, GROUND = 0.1, 0.25  # sRGB, by which a gap is unlike the object, and like the background
+UNMIXED = 0.07  # sRGB, by which a gap in the mean is no mixture of both
+FINE = 0.115  # alpha, by which it changes over a band's width between strands, in the mean
 AROUND = 2.0  # x band: looked at with it
 
 
@@ -56,22 +61,13 @@ def strays(pixels: Pixels, mask: Mask, band: float, reach: float) -> Mask | None
         size, times = size.half(), 2 * times
     band, reach = band / times, STRAY * reach / times
     distance, rgb = signed_distance(size.mask), size.rgb(WHOLE_PICTURE)
-    step = _step(rgb, distance, band, reach)
-    is_open = (step < EDGES[0]) & (clearness_of(rgb, distance, reach) > CLEAR)
-    if not (is_open & (np.abs(distance) < reach)).any():
+    is_clear = clearness_of(rgb, distance, reach) > CLEAR
+    if not (is_clear & (np.abs(distance) < reach)).any():
         return None
+    outline = _Outline(rgb, distance, band, reach)
     change = whole_band(size, reach, None) - size.mask
-    change[(np.abs(distance) < band) | (np.abs(change) < CHANGED)] = 0
-    if np.abs(change).sum() < LEAST * band**2:
-        return None
-    own = (step > EDGES[1]) & (distance > BESIDE[0] * band) & (distance < BESIDE[1] * band)
-    sure = 2 * _likeness(rgb, distance, reach, change != 0, own) - 1
-    change[(change > 0) & (sure < 0)] = 0  # a hair before the background is more like that
-    share, total = (
-        cv2.GaussianBlur(part, (0, 0), GATHERED * band) for part in (sure * change, abs(change))
-    )
-    found = is_open & (share > AGREED * total) & (total > 0.01)
-    found = _large(found, np.abs(change), LEAST * band**2)
+    change[np.abs(distance) < band] = 0
+    found = _beside_hair(outline, change, is_clear) | _gaps(outline, change, is_clear)
     if not found.any():
         return None
     wide = 2 * round(AROUND * band) + 1
@@ -80,31 +76,123 @@ def strays(pixels: Pixels, mask: Mask, band: float, reach: float) -> Mask | None
     return np.repeat(np.repeat(found, times, 0), times, 1)[:height, :width] > 0
 
 
-def _likeness(rgb: F32, distance: F32, reach: float, where: Mask, own: Mask) -> F32:
-    """(h, w) alpha by the colours (h, w, 3) alone `where` asked; one half where they do not tell.
+class _Outline(NamedTuple):
+    """A picture with the outline of a mask."""
+
+    rgb: F32  # (h, w, 3)
+    distance: F32  # (h, w) px within it
+    band: float
+    reach: float  # px: how far from it alpha is solved for
+
+    @property
+    def sides(self) -> tuple[Mask, Mask]:
+        """(h, w) what is surely the object's and the background's, near by."""
+        far = KNOWN * self.reach
+        inside, outside = self.distance, -self.distance
+        return (inside > self.reach) & (inside < far), (outside > self.reach) & (outside < far)
+
+
+def _beside_hair(outline: _Outline, change: F32, is_clear: Mask) -> Mask:
+    """(h, w) where the mask lies on no edge, and colours say that alpha does `change` (h, w)."""
+    rgb, distance, band, reach = outline
+    change = np.where(np.abs(change) < CHANGED, 0, change)
+    if np.abs(change).sum() < LEAST * band**2:
+        return np.zeros(change.shape, np.bool_)
+    step = _step(rgb, distance, band, reach)
+    is_open = (step < EDGES[0]) & is_clear
+    own = (step > EDGES[1]) & (distance > BESIDE[0] * band) & (distance < BESIDE[1] * band)
+    sure = 2 * _likeness(outline, change != 0, own) - 1
+    change[(change > 0) & (sure < 0)] = 0  # a hair before the background is more like that
+    share, total = (
+        cv2.GaussianBlur(part, (0, 0), GATHERED * band) for part in (sure * change, abs(change))
+    )
+    found = is_open & (share > AGREED * total) & (total > 0.01)
+    return _large(found, np.abs(change), LEAST * band**2)
+
+
+def _gaps(outline: _Outline, change: F32, is_clear: Mask) -> Mask:
+    """(h, w) where the background shows between strands, so that alpha does `change` (h, w)."""
+    least, over = LEAST * outline.band**2, GATHERED * outline.band
+    is_gap = is_clear & (outline.distance < outline.reach) & (change < -FAINT)
+    lost = np.where(is_gap, -change, 0).astype(np.float32)
+    found = np.zeros(lost.shape, np.bool_)
+    apart = _apart(outline, is_gap, outline.sides) if lost.sum() >= least else None
+    if apart is None:
+        return found
+
+    wide = (outline.distance > 0) + change
+    fine = np.abs(wide - cv2.GaussianBlur(wide, (0, 0), outline.band))[is_gap]
+
+    def mean(values: F32 | float) -> F32:
+        weighed = np.zeros(lost.shape, np.float32)
+        weighed[is_gap] = values * lost[is_gap]
+        return np.asarray(cv2.GaussianBlur(weighed, (0, 0), over), np.float32)[is_gap]
+
+    total = np.maximum(mean(1.0), 1e-6)
+    foreign, ground, through = (mean(values) / total for values in (*apart.far, lost[is_gap]))
+    found[is_gap] = (foreign > FOREIGN) & (ground < GROUND) & (through > SEEN_THROUGH)
+    near = dilated(found, int(outline.band)).view(np.uint8)
+    _, joined = cv2.connectedComponents(near)
+    pieces, share = np.asarray(joined, np.int32)[is_gap], lost[is_gap]
+    pieces = np.where(found[is_gap], pieces, 0)
+    sums = [np.bincount(pieces, share * values) for values in (1.0, fine, apart.unmixed)]
+    lost_in, varied, unmixed = sums[0], *(part / np.maximum(sums[0], 1e-6) for part in sums[1:])
+    is_strands = (lost_in >= least) & (varied > FINE) & (unmixed < UNMIXED)
+    found[is_gap] = is_strands[pieces] & (pieces > 0)
+    return found
+
+
+def _likeness(outline: _Outline, where: Mask, own: Mask) -> F32:
+    """(h, w) alpha by the colours alone `where` asked; one half where they do not tell.
 
     What is `own` (h, w) is the object's, and so is what is `reach` px within the mask's outline.
     """
-    likely = np.full(distance.shape, 0.5, np.float32)
+    likely = np.full(where.shape, 0.5, np.float32)
+    inside, outside = outline.sides
+    apart = _apart(outline, where, (inside | own, outside))
+    if apart is not None:
+        near, off = (apart.far + ALIKE) ** 2
+        likely[where] = off / (near + off)
+    return likely
+
+
+class _Apart(NamedTuple):
+    """Colours of a picture beside those nearby of the object and of the background."""
+
+    far: F32  # (2, n) from each
+    unmixed: F32  # (n,) from all mixtures of both
+
+
+def _apart(outline: _Outline, where: Mask, sides: tuple[Mask, Mask]) -> _Apart | None:
+    """How far the colours `where` (h, w) are from those of each of the `sides` (h, w).
+
+    None where too few are known of one.
+    """
+    rgb, distance, _, reach = outline
     place = np.indices(distance.shape, dtype=np.float32).transpose(1, 2, 0) * (NEAR / reach)
     features = np.concatenate([rgb, place], -1)
-    asked, far = features[where], KNOWN * reach
-    apart = np.empty((2, len(asked)), np.float32)
-    inside = (distance > reach) & (distance < far) | own
-    for side, there in enumerate((inside, (distance < -reach) & (distance > -far))):
+    asked = features[where]
+    far = np.empty((2, len(asked)), np.float32)
+    alike = np.empty((2, len(asked), 3), np.float32)
+    for side, there in enumerate(sides):
         known = features[there]
         if len(known) < NEIGHBOURS:
-            return likely
-        tree = KDTree(known[:: -(-len(known) // MOST)])
+            return None
+        known = known[:: -(-len(known) // MOST)]
+        tree = KDTree(known)
 
-        def look(first: int, last: int, tree: KDTree = tree, side: int = side) -> None:
-            found, _ = tree.query(asked[first:last], k=NEIGHBOURS)
-            apart[side, first:last] = found[:, -1]
+        def look(
+            first: int, last: int, tree: KDTree = tree, side: int = side, known: F32 = known
+        ) -> None:
+            found, which = tree.query(asked[first:last], k=NEIGHBOURS)
+            far[side, first:last] = found[:, -1]
+            alike[side, first:last] = known[np.asarray(which)[:, -1], :3]
 
         in_threads(look, len(asked))
-    near, off = (apart + ALIKE) ** 2
-    likely[where] = off / (near + off)
-    return likely
+    line, own = alike[0] - alike[1], asked[:, :3] - alike[1]
+    share = (own * line).sum(1) / np.maximum((line * line).sum(1), 1e-4)
+    off = own - share.clip(0, 1)[:, None] * line
+    return _Apart(far, np.asarray(np.linalg.norm(off, axis=1), np.float32))
 
 
 def _step(rgb: F32, distance: F32, band: float, reach: float) -> F32:

@@ -23,6 +23,7 @@ from objectmorpher_core.raster.texture import sample_texture
 from objectmorpher_core.raster.trust import trust_in
 from tests import shapes
 from tests.core.segment.test_matte import furry
+from tests.tree import over
 
 LEVEL = 2 / 255
 TURN = Placement(turn=(45.0, 0.0, 0.0))
@@ -206,6 +207,16 @@ def test_what_stands_out_is_not_there_twice():
     made, share = mirrored(replace(picture, is_odd=odd))
     shown = np.where(share[..., None] > 0.5, made, 127.5)
     assert np.ptp(shown[:, 120:], axis=-1).max() < 40  # nothing yellow
+
+
+@over("coarse", [8.0, 12.0, 16.0])
+def test_most_of_a_pattern_does_not_stand_out_and_an_eye_in_it_does(coarse):
+    noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(320, 400)), (0, 0), coarse)
+    fur = np.repeat((120 + 35 * noise / noise.std())[..., None], 3, 2).astype(np.float32)
+    cv2.circle(fur, (200, 160), 14, (255.0, 255.0, 0.0), -1)
+    odd = standing_out(fur, np.ones((320, 400), np.bool_))
+    assert odd[160, 200]
+    assert odd.mean() < 0.55, odd.mean()  # of 8 px it was 0.86
 
 
 def test_at_rest_nothing_of_it_is_seen(scene):

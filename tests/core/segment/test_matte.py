@@ -28,6 +28,7 @@ from objectmorpher_core.segment.matting.matte import (
 from objectmorpher_core.segment.matting.straying import strays
 from objectmorpher_core.segment.matting.unmix import exact, unmixed
 from tests import shapes
+from tests.tree import over
 
 LEVEL = 1 / 255
 ROUNDING = (
@@ -347,6 +348,30 @@ def test_an_edge_is_looked_for_farther_off_only_where_the_mask_lies_on_none(unli
     found = strays(furred, mask, band, REACH * band)
     assert found is not None
     assert found[mask & ~(cv2.erode(mask.astype(np.uint8), disc(4)) > 0)].mean() > 0.7
+
+
+@over("between", ["gaps", "patches"])
+def test_the_ground_shows_between_strands_and_patches_of_another_colour_stay(between):
+    """A mask goes around the strands of a mane, with what is between them."""
+    height, width, root = 480, 640, 130.0
+    rows, columns = np.mgrid[:height, :width] - np.array([240.5, 320.5])[:, None, None]
+    away, angle = np.hypot(rows, columns), np.arctan2(rows, columns)
+    mask = away < root + 22
+    is_gap = mask & (away > root) & (np.cos(40 * angle) > 0) & (rows < 0)
+    noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(height, width, 3)), (0, 0), 1.5)
+    colours = {"gaps": (150, 180, 90), "patches": (250, 120, 200)}
+    photo = np.where(mask[..., None], (60, 45, 40), colours["gaps"])
+    photo = np.where(is_gap[..., None], colours[between], photo) + noise * (5 / noise.std())
+    photo = cv2.GaussianBlur(photo.clip(0, 255).astype(np.uint8), (0, 0), 0.7)
+    matte = build_matte(photo, mask, 400)
+    alpha = crop(matte.alpha, matte.box, (0, 0, width, height))
+    inner = cv2.erode(is_gap.astype(np.uint8), disc(3)) > 0
+    assert inner.sum() > 500
+    if between == "gaps":
+        assert alpha[inner].mean() < 0.1  # it was 0.98
+    else:
+        assert alpha[inner].mean() > 0.9
+    assert alpha[mask & (away < root - 4)].min() > 0.9
 
 
 def test_the_wider_a_blur_the_wider_is_alpha():
