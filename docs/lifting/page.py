@@ -226,12 +226,12 @@ composites of [matting](../matting/README.md), whose masks fit, stay as they wer
 
 The strands of a mane reach the mask's edge, and that is an edge of the picture. The background
 shows between them where the wide matte sees through, and what is there is unlike all of the
-object near by, like the background, a mixture of both, and not the same from strand to strand. Of
-62 masks of photographs, all of them in view when that was chosen, seven change: a horse's mane and
-tail, a lion's mane, the arms of a lamp and the columns of a pagoda are free of what was behind
-them; a tripod's leg is a little thinner. Without the last two conditions two composites would lose
-a dark collar before a dark roof and a white rim before leaves; with them all scores of matting are
-as they were.
+object near by, like the background, a mixture of both, not the same from strand to strand, and not
+deep inside. Of 62 masks of photographs, all of them in view when that was chosen, seven change: a
+horse's mane and tail, a lion's mane, the arms of a lamp and the columns of a pagoda are free of
+what was behind them; a tripod's leg is a little thinner. Without the last three conditions a dark
+collar before a dark roof, a white rim before leaves, and a tabby's stripes before black would go;
+with them all scores of matting are as they were.
 
 ## Beyond the photo's frame
 

@@ -11,7 +11,8 @@ That leaks as well into a white sleeve before a white wall; so it is believed on
 alone say the same, those of the object well inside that band and of the background well outside,
 and where the mask's outline lies on no edge of the picture; within such an edge all is the
 object's (`strays`). But for gaps between strands that reach that edge: what is there is unlike all
-of the object, like the background, a mixture of both, and not the same from strand to strand.
+of the object, like the background, a mixture of both, not the same from strand to strand, and not
+deep inside.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ LEAST = 11.0  # x band^2: area of what must have changed to be looked at
 FAINT, SEEN_THROUGH = 0.05, 0.3  # alpha that a gap lacks: in each place, and in the mean
 FOREIGN, GROUND = 0.1, 0.25  # sRGB, by which a gap is unlike the object, and like the background
 UNMIXED = 0.07  # sRGB, by which a gap in the mean is no mixture of both
+NEAR_EDGE = 3.3  # x band: how deep inside the outline it is in the mean, at most
 FINE = 0.115  # alpha, by which it changes over a band's width between strands, in the mean
 AROUND = 2.0  # x band: looked at with it
 
@@ -135,9 +137,10 @@ def _gaps(outline: _Outline, change: F32, is_clear: Mask) -> Mask:
     _, joined = cv2.connectedComponents(near)
     pieces, share = np.asarray(joined, np.int32)[is_gap], lost[is_gap]
     pieces = np.where(found[is_gap], pieces, 0)
-    sums = [np.bincount(pieces, share * values) for values in (1.0, fine, apart.unmixed)]
-    lost_in, varied, unmixed = sums[0], *(part / np.maximum(sums[0], 1e-6) for part in sums[1:])
-    is_strands = (lost_in >= least) & (varied > FINE) & (unmixed < UNMIXED)
+    deep = outline.distance[is_gap] / outline.band
+    all_in, *sums = (np.bincount(pieces, share * v) for v in (1.0, fine, apart.unmixed, deep))
+    varied, unmixed, away = (part / np.maximum(all_in, 1e-6) for part in sums)
+    is_strands = (all_in >= least) & (varied > FINE) & (unmixed < UNMIXED) & (away < NEAR_EDGE)
     found[is_gap] = is_strands[pieces] & (pieces > 0)
     return found
 

@@ -356,7 +356,7 @@ def test_the_ground_shows_between_strands_and_patches_of_another_colour_stay(bet
     height, width, root = 480, 640, 130.0
     rows, columns = np.mgrid[:height, :width] - np.array([240.5, 320.5])[:, None, None]
     away, angle = np.hypot(rows, columns), np.arctan2(rows, columns)
-    mask = away < root + 22
+    mask = away < root + 16
     is_gap = mask & (away > root) & (np.cos(40 * angle) > 0) & (rows < 0)
     noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(height, width, 3)), (0, 0), 1.5)
     colours = {"gaps": (150, 180, 90), "patches": (250, 120, 200)}
