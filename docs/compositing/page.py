@@ -146,10 +146,10 @@ What was tried and is not used: bodies as deep as they are wide, a brightness of
 colour of the ground, the steps of light along the shadow's edge, the same shape elsewhere on the
 ground, and the side from which the thing itself is lit; and how far the network's shade and the
 fitted one agree, as evidence. None of them finds more where equally many are imagined.
-Neither does training that goes on, for 3,700 steps on 1,536 other scenes seen at both scales, with
-the mean of the weights before and after: by how sure the network is, where 3 are imagined, 122
-large shadows instead of 111 are found in the half of whose photographs parts were trained on, but
-74 instead of 77 in the half that was held out.
+Training the network further does not help either. After 3,700 more steps on 1,536 other scenes,
+seen at both scales, the mean of the old weights and the new ones finds 122 large shadows instead
+of 111 in the half whose photographs were partly trained on, but 74 instead of 77 in the half that
+was held out. Both are counted by the network alone, at the margin where 3 are imagined.
 
 On photographs: the saucer's shadow, the motorcycle's, and a bowl's in the sun, seen from above. Its
 shadow is its outline, beside itself, in the photo and where it goes; where its hard edge is, how

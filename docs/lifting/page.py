@@ -177,11 +177,11 @@ pitch by 20 degrees, 0.1 lower of a turn by 20 and the same of one by 35; the do
 one side.
 
 What stands out, an eye or a nose, is not there twice; but of a striped or spotted coat nearly
-everything stood out, two thirds of a tabby, and its side stayed plain. Now what is unlike its
-surroundings is a pattern, but for the 7 % of a surface that are most so. Of 14 photographs of
-animals and people that were turned by 25 degrees to both sides, all of them in view when that was
-chosen, a tabby, a giraffe, a tiger and an eagle have their pattern on their sides, and nothing is
-worse on the others.
+everything stood out, two thirds of a tabby, and its side stayed plain. Now at most the 7 % of a
+surface that are most unlike their surroundings stand out, with what lies close around them; the
+rest is a pattern. Of 14 photographs of animals and people that were turned by 25 degrees to both
+sides, all of them in view when that was chosen, a tabby, a giraffe, a tiger and an eagle have their
+pattern on their sides, and the others look no worse.
 
 A side that turns into view is smooth, and hair ended there as clay does, in a hard, wavy line. Now
 strands are rooted on it, thin Gaussians as long as the photo's own hair is soft, as many as its
