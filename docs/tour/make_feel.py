@@ -17,6 +17,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from statistics import median, quantiles
 
@@ -24,7 +25,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "app")]
 
+import numpy as np  # noqa: E402
+from PIL import Image  # noqa: E402
+
 from hands import Hands, window_environment, x_display  # noqa: E402
+from objectmorpher_core.pictures.image import Picture, encode_picture  # noqa: E402
 from objectmorpher_core.pipeline import open_photo  # noqa: E402
 from objectmorpher_core.session.file import save_session  # noqa: E402
 
@@ -32,12 +37,13 @@ SAMPLE = ROOT / "assets" / "samples" / "astronaut.jpg"
 SCREEN = (1440, 1100)  # px
 SIZE = (1372, 1084)  # points of the window, in which the canvas has 1024 x 1024
 OBJECT = (600, 420)  # px on the screen: on what is lifted
+LARGE = (1024, 1024)  # px of the photo that is opened and clicked
 COUNTS = (100_000, None)  # Gaussians; None: as many as usual
 RATE = 1 / 60  # s between two places of the pointer
 SECONDS = 8.0  # of a drag
 SWING = 60.0  # px that the pointer goes to either side
 QUIET = 6.0  # s after opening: the worker has read the photo and filled in the background
-STARTS = 5
+STARTS = 5  # and openings of a photo
 PATIENCE = 60.0  # s
 
 HEAD = """# How the window feels
@@ -181,6 +187,33 @@ def work_beside(environment: dict[str, str], folder: Path) -> Feel:
     return feel(sent, log, "job")
 
 
+def first_click(environment: dict[str, str], folder: Path, number: int) -> tuple[float, float]:
+    """s from a photo of 1 MP on the screen, clicked at once, to its selection and a closer look.
+
+    It is opened in a window that has shown another, and differs each time.
+    """
+    log, other, photo = folder / "frames.json", folder / "other.omorph", folder / "large.omorph"
+    pixels = Image.open(SAMPLE).convert("RGB").resize(LARGE, Image.Resampling.LANCZOS)
+    shifted = encode_picture(Picture(np.roll(np.asarray(pixels), -number, axis=1)), ".png")
+    save_session(open_photo(SAMPLE.read_bytes(), SAMPLE.name), other)
+    save_session(open_photo(shifted, SAMPLE.name), photo)
+    with window(other, environment, log) as mouse:
+        hands = Hands(environment)
+        mouse.do("mousemove", *OBJECT)
+        hands.press("ctrl+o")
+        hands.fill_in(photo)
+        hands.wait(lambda: photo.name in hands.title(), "opening")
+        mouse.do("click", 1)
+        time.sleep(QUIET)
+    phases = [(job, list(found)) for job, found in
+              groupby(json.loads(log.read_text()), key=lambda frame: frame["job"])]  # fmt: skip
+    opened = max(i for i, (job, _) in enumerate(phases) if job == "Reading the photo")
+    assert phases[opened + 1][0] == "Selecting"
+    done = next(i for i in range(opened, len(phases)) if not phases[i][0])
+    began, *ends = (phases[i][1][0]["shown"] for i in (opened, opened + 2, done))
+    return ends[0] - began, ends[1] - began
+
+
 def start(environment: dict[str, str], folder: Path) -> float:
     """s from the command to the first frame on the screen."""
     log = folder / "frames.json"
@@ -214,12 +247,15 @@ def main() -> None:
             label = "usual number of" if count is None else f"{count:,}"
             rows.append(f"| a point dragged, {label} Gaussians | "
                         f"{drag(session, environment, folder).row} |\n")  # fmt: skip
+        clicks = [first_click(environment, folder, n) for n in range(STARTS)]
         beside = work_beside(environment, folder)
         rows.append(f"| the pointer moves while the worker computes | {beside.row} |\n")
     machine = f"{platform.machine()}, {os.cpu_count()} cores"
     text = HEAD.format(machine=machine, load=load) + "".join(rows)
     text += f"\nFrom the command to the first frame on the screen: {median(starts):.2f} s "
-    text += f"(median of {STARTS}).\n"
+    text += f"(median of {STARTS}). From a photo of 1 MP on the\n"
+    text += f"screen, clicked at once, to its selection: {median(c[0] for c in clicks):.2f} s; until a closer look "
+    text += f"has settled it: {median(c[1] for c in clicks):.2f} s.\n"
     (HERE / "feel.md").write_text(text, encoding="utf-8")
     print(text)
 

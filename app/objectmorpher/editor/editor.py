@@ -289,7 +289,7 @@ class Editor(EditorState):
     # Time
 
     def poll(self) -> bool:
-        """Takes in what was computed elsewhere; once a frame. Whether anything changed."""
+        """Takes in what was computed elsewhere; once a frame. Whether more than progress came."""
         return any([poll() for poll in self._pollers])
 
     def shut_down(self) -> None:

@@ -24,7 +24,7 @@ from objectmorpher_core.base.progress import Cancelled
 
 from ..system.logs import crash_folder, note_crashes
 from .apart import ApartProcess, Flag
-from .requests import Executor, JobError, Request
+from .requests import PROGRESS, Executor, JobError, Request
 from .wire import Connection, PipeReader, PipeWriter
 
 if TYPE_CHECKING:
@@ -95,7 +95,8 @@ class Worker:
 
     def _deliver(self, what: str, number: int, value: Any) -> None:
         self.answers.put((what, number, value))
-        self._wake()
+        if what != PROGRESS:  # the window looks by itself while a job runs
+            self._wake()
 
 
 class Jobs(Executor):
@@ -165,8 +166,9 @@ class Jobs(Executor):
     def poll(self) -> bool:
         is_changed = False
         while self._worker is not None and not self._worker.answers.empty():
-            self._take(*self._worker.answers.get())
-            is_changed = True
+            answer = self._worker.answers.get()
+            self._take(*answer)
+            is_changed = is_changed or answer[0] != PROGRESS
         job = self.current
         if job and time.monotonic() > job.ends_at:
             log.info("%s did not stop when asked; restarting the worker", job.title)
@@ -215,7 +217,7 @@ class Jobs(Executor):
         self._worker.has_answered = True
         if job is None or number != job.number:
             return  # an answer of a process that was ended
-        if what == "progress":
+        if what == PROGRESS:
             job.fraction, job.note = value
         elif what == "cancelled" or job.stop_asked is not None:
             self._finish(job, job.cancelled)
@@ -302,6 +304,6 @@ def _reporter(writer: PipeWriter, number: int, stop: Any) -> Callable[[float, st
         now = time.monotonic()
         if note != last or now - last_time > REPORT_EVERY:
             last, last_time = note, now
-            writer.write(("progress", number, (float(fraction), note)))
+            writer.write((PROGRESS, number, (float(fraction), note)))
 
     return progress

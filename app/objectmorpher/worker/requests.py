@@ -194,6 +194,7 @@ class Executor(ABC):
 
 # Chores: requests that are done each in a thread of its own: opening files, downloads.
 
+PROGRESS = "progress"  # a message that wakes nobody: who shows it looks by itself
 FAREWELL = 1.0  # s that closing waits for what was asked to stop
 
 
@@ -244,7 +245,7 @@ class Chores(Executor):
         while not self._answers.empty():
             chore, what, value = self._answers.get()
             if chore in [running for running, _ in self._running.values()]:
-                is_changed = True
+                is_changed = is_changed or what != PROGRESS
                 self._take(chore, what, value)
         return is_changed
 
@@ -256,7 +257,7 @@ class Chores(Executor):
             thread.join(FAREWELL)
 
     def _take(self, chore: Request, what: str, value: Any) -> None:
-        if what == "progress":
+        if what == PROGRESS:
             chore.fraction, chore.note = value
             return
         del self._running[chore.kind]
@@ -272,8 +273,7 @@ class Chores(Executor):
         def progress(fraction: float, note: str) -> None:
             if chore.stop_asked is not None:
                 raise Cancelled
-            self._answers.put((chore, "progress", (fraction, note)))
-            self._wake()
+            self._answers.put((chore, PROGRESS, (fraction, note)))
 
         try:
             answer = chore, "done", chore.function(*chore.arguments, progress=progress)

@@ -50,7 +50,7 @@ log = logging.getLogger(__name__)
 
 SETTLE = 3  # frames drawn after the last event: ImGui lays out in two
 IDLE = 0.5  # s between two looks at the clock when nothing happens
-BUSY = 0.2  # s, while a job runs; what it reports wakes the window besides
+BUSY = 0.1  # s, while a job runs, whose progress is shown; frames take cores from it
 SOON = 0.05  # s, while a dialog is open or an exact picture is due
 DOUBLE_CLICK = 0.45  # s between two presses, about as desktops have it; ImGui allows 0.5
 CONTROL = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
@@ -192,7 +192,8 @@ class Window:
     def _wait(self) -> int:
         """Sleeps until an event; how many frames to draw for it."""
         editor = self.editor
-        patience = BUSY if editor.jobs.current is not None else IDLE
+        is_busy = editor.jobs.current is not None or not editor.chores.is_idle
+        patience = BUSY if is_busy else IDLE
         is_due = editor.cache.is_waiting or editor.candidates.is_due
         if self._dialogs.is_open or is_due:
             patience = SOON
