@@ -201,14 +201,14 @@ def looks_drawn(matte: Matte) -> bool:
     count = len(left)
     if count < max(LEAST_DRAWN, TELLING * len(pixels)):
         return False
-    painted = 0
+    codes, counts = np.unique(left @ (1 << 16, 1 << 8, 1), return_counts=True)
+    colours, painted = codes[:, None] >> (16, 8, 0) & 255, 0
     for _ in range(PALETTE):
-        if len(left) == 0:
+        if len(counts) == 0:
             break
-        colours, counts = np.unique(left, axis=0, return_counts=True)
-        off = np.abs(left - colours[counts.argmax()]).max(1)
-        painted += np.count_nonzero(off <= 1)
-        left = left[off > APART]
+        off = np.abs(colours - colours[counts.argmax()]).max(1)
+        painted += counts[off <= 1].sum()
+        colours, counts = colours[off > APART], counts[off > APART]
     return bool(painted > PAINTED * count)
 
 
