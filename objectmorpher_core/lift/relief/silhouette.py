@@ -6,6 +6,7 @@ object that leaves the photo goes on a little beyond the frame, where its cut is
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -207,9 +208,12 @@ def largest_disc(depth):
                 continue
             reach = int(r)
             for a in range(max(i - reach, 0), min(i + reach + 1, height)):
-                for b in range(max(j - reach, 0), min(j + reach + 1, width)):
-                    if (a - i) ** 2 + (b - j) ** 2 < r * r and largest[a, b] < r:
-                        largest[a, b] = r
+                rest = r * r - (a - i) ** 2
+                half = math.ceil(math.sqrt(max(rest, 0.0)))
+                while half >= 0 and half * half >= rest:  # as far as cells are nearer than r
+                    half -= 1
+                for b in range(max(j - half, 0), min(j + half + 1, width)):
+                    largest[a, b] = max(largest[a, b], r)
     return largest
 
 

@@ -120,7 +120,7 @@ def _ellipse(ring: F64, error: float) -> tuple[F64, Mask]:
         is_on = _is_on(conic, own, error / size)
         if is_on.sum() < 6:
             break
-        conic = np.linalg.svd(terms[is_on])[2][-1]
+        conic = np.linalg.svd(terms[is_on], full_matrices=False)[2][-1]
     is_on = _is_on(conic, own, error / size)
     into = np.array([[1 / size, 0, -middle[0] / size], [0, 1 / size, -middle[1] / size], [0, 0, 1]])
     return into.T @ _matrix(conic) @ into, is_on
