@@ -31,8 +31,14 @@ class Log:
 
 
 @pytest.fixture(scope="module")
-def worker() -> Iterator[Jobs]:
-    jobs = Jobs()
+def wakes() -> list[float]:
+    """When `worker` woke the window."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def worker(wakes: list[float]) -> Iterator[Jobs]:
+    jobs = Jobs(wake=lambda: wakes.append(time.monotonic()))
     yield jobs
     jobs.close()
 
@@ -80,14 +86,23 @@ def test_a_large_array_is_the_same_object_in_the_worker_twice(worker: Jobs) -> N
     assert log.answers == [False, True]
 
 
-def test_progress_is_seen_while_the_job_runs(worker: Jobs) -> None:
+def test_progress_is_seen_while_the_job_runs_but_is_no_news(
+    worker: Jobs, wakes: list[float]
+) -> None:
+    """Frames for each report would take the cores that the job needs."""
     log = Log()
-    start(worker, log, job_functions.wait, 0.5)
-    run_until(worker, lambda: worker.current is not None and worker.current.fraction > 0.3)
+    wakes.clear()
+    start(worker, log, job_functions.wait, 1.0)
     assert worker.current is not None
+    end = time.monotonic() + 20
+    while worker.current.fraction <= 0.3 and time.monotonic() < end:
+        assert not worker.poll()
+        time.sleep(0.005)
     assert worker.current.note == "waiting"
+    assert wakes == []
     run_until(worker, lambda: worker.is_idle)
     assert log.answers == ["waited"]
+    assert len(wakes) == 1
 
 
 def test_cancelling_stops_a_job_that_asks(worker: Jobs) -> None:
