@@ -61,13 +61,18 @@ NEAREST, FAR_OFF = 1e-3, 1e3  # depth that a box has at least; what is off of on
 STEPS = np.array([0.15, 0.15, 0.15, 0.03, 0.03, 0.03, 0.15, 0.15, 0.15])
 
 
-def fit_box(evidence: Evidence) -> tuple[Mesh, Misfit]:
-    """The best of boxes that were refined from different rotations."""
+def fit_box(evidence: Evidence, hopeless: float = np.inf) -> tuple[Mesh, Misfit]:
+    """The best of boxes that were refined from different rotations.
+
+    `hopeless`: misfit, from which its outline is not looked at more closely.
+    """
     guesses = _guesses(evidence)
     guesses.sort(key=lambda guess: evidence.misfit(guess(np.zeros(9))).total)
     fits = [refined(guess, np.zeros(9), STEPS, evidence) for guess in guesses[:KEPT]]
     best = int(np.argmin([misfit.total for _, misfit in fits]))
     mesh, misfit = guesses[best](fits[best][0]), fits[best][1]
+    if misfit.total > hopeless:
+        return mesh, misfit
     finer = guesses[best](_outlined(guesses[best], fits[best][0], evidence))
     is_better = (found := evidence.misfit(finer)).total < misfit.total + WORSE
     return (finer, found) if is_better else (mesh, misfit)

@@ -224,10 +224,12 @@ def _moments(evidence: Evidence) -> tuple[F64, F64, F64, float]:
     return middle, axes, half, float(np.linalg.norm(middle))
 
 
-def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit, float] | None:
+def fit_revolution(
+    evidence: Evidence, hopeless: float = np.inf
+) -> tuple[Mesh, Misfit, float] | None:
     """The best of several axes and leanings, and the bend of its profile, radians.
 
-    None where nothing is alike on both sides.
+    None where nothing is alike on both sides, or all cost more than is `hopeless` at first.
     """
     trials = []
     for lathe in _lathes(evidence):
@@ -236,7 +238,8 @@ def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit, float] | None:
                 cost = evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
                 trials.append((cost, lathe, lean))
     trials.sort(key=lambda trial: trial[0])
-    fits = [_refined(lathe, lean, evidence) for _, lathe, lean in trials[:KEPT]]
+    kept = [trial for trial in trials[:KEPT] if trial[0] <= hopeless]
+    fits = [_refined(lathe, lean, evidence) for _, lathe, lean in kept]
     return min(fits, key=lambda fit: fit[1].total + SIMPLER * fit[2], default=None)
 
 
