@@ -51,8 +51,8 @@ PALETTE, PAINTED, APART, TELLING, DARK, LIGHT = 5, 0.4, 12, 0.3, 48, 250
 OPAQUE, SAMPLE, LEAST_DRAWN = 0.99, 80_000, 100  # alpha; px that are looked at; px
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
 EXPLAINED = 0.95  # weight, from which no other shape is tried
-# Misfit, from which a first guess does not become what is recognised: of drawn solids those that did
-# began at 8.7 or less. Of 62 objects in photographs it changes nothing but the time, by a third.
+# Misfit, from which a first guess does not become what is recognised: of drawn solids those that
+# did began at 8.7 or less. Of 62 objects in photographs it changes only the time, by a third.
 FRUITLESS = 25.0
 STANDS, LYING = 0.5, 0.5  # weight of a shape that shows what is up, and cosine to the upright
 # Of what a plate's rim encloses: how near its middle the far half is looked at, x the rim's radius
