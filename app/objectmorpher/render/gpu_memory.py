@@ -81,7 +81,7 @@ class Stream:
         return is_new
 
 
-# Projected Gaussians in a buffer on the GPU, each drawn as a rectangle.
+# Projected Gaussians in a buffer on the GPU, each drawn as a rectangle or a triangle.
 
 Columns = tuple[tuple[str, str], ...]  # name and format of each column of a buffer
 
@@ -114,13 +114,14 @@ class Instances:
         """Read all rows, which waits for the GPU."""
         return self._stream.buffer.read(self.count * self.row_size)
 
-    def draw(self, program: moderngl.Program) -> None:
+    def draw(self, program: moderngl.Program, corners: int) -> None:
+        """Draw each row as a shape of 3 or 4 corners."""
         if self.count == 0:
             return
         if program.glo not in self._arrays:
             layout = buffer_layout(program, self._stream.buffer, self.columns, "/i")
             self._arrays[program.glo] = self._context.vertex_array(program, [layout])
-        self._arrays[program.glo].render(moderngl.TRIANGLE_STRIP, 4, instances=self.count)
+        self._arrays[program.glo].render(moderngl.TRIANGLE_STRIP, corners, instances=self.count)
 
 
 # Pictures on the GPU, uploaded when the array is not the last one.

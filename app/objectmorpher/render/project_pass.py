@@ -62,7 +62,7 @@ class ProjectPass:
         name = "skin" if isinstance(motion, Skin) else "none" if motion is None else "given"
         program = self._program(name, order is None)
         uniforms = _uniforms(splats, camera, photo_camera)
-        content = self._rest(program, splats.rest, photo_camera)
+        content = self._rest(program, splats.rest, photo_camera, order is None)
         if isinstance(motion, Skin):
             content += self._bound(program, motion.binding)
             uniforms |= self._moved(motion.motion)
@@ -82,24 +82,29 @@ class ProjectPass:
         key = (motion, is_layered)
         if key not in self._programs:
             names = [name for name, _ in (LAYERED if is_layered else PLAIN)]
+            defines = () if is_layered else ("IS_PLAIN",)
             self._programs[key] = build_feedback(
-                self._context, "splat_project.vert", names, MOTION=f"motion_{motion}.glsl"
-            )
+                self._context, "splat_project.vert", names, *defines,
+                MOTION=f"motion_{motion}.glsl",
+            )  # fmt: skip
             stretches = (LEAST_STRETCH, MOST_STRETCH)
             set_uniforms(self._programs[key], **RULES._asdict(), nodes=0, stretches=stretches)
         return self._programs[key]
 
-    def _rest(self, program: moderngl.Program, rest: RestSplats, photo: Camera) -> list[Any]:
+    def _rest(
+        self, program: moderngl.Program, rest: RestSplats, photo: Camera, is_layered: bool
+    ) -> list[Any]:
         """What does not depend on the motion. Paint changes none of it but its own."""
         uploads, buffer = self._uploads, self._context.buffer
         geometry = uploads("geometry", rest.means, lambda: buffer(_table_geometry(rest, photo)))
         paint = uploads("paint", rest, lambda: buffer(_table_paint(rest)))
-        sides = uploads("sides", rest.means, lambda: buffer(_table_sides(rest, photo)))
-        return [
-            buffer_layout(program, geometry, GEOMETRY),
-            buffer_layout(program, paint, PAINT),
-            buffer_layout(program, sides, SIDES),
-        ]
+        content = [
+            buffer_layout(program, geometry, GEOMETRY), buffer_layout(program, paint, PAINT)
+        ]  # fmt: skip
+        if is_layered:
+            sides = uploads("sides", rest.means, lambda: buffer(_table_sides(rest, photo)))
+            content.append(buffer_layout(program, sides, SIDES))
+        return content
 
     def _bound(self, program: moderngl.Program, binding: Binding) -> list[Any]:
         uploads, buffer = self._uploads, self._context.buffer

@@ -20,7 +20,7 @@ from objectmorpher_core.base.threads import FAST, LEAST_ROWS, in_threads
 from objectmorpher_core.deform.skinning import Skin, nodes_of
 from objectmorpher_core.raster.binning import depth_order
 from objectmorpher_core.raster.posed import PosedSplats
-from objectmorpher_core.raster.rules import RULES
+from objectmorpher_core.raster.rules import RULES, Splatting
 from objectmorpher_core.raster.texture import TextureLevels
 
 from .gpu_memory import Instances, Uploads
@@ -176,7 +176,7 @@ class CloudPass:
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
-        self._program = build_program(context, "splat.vert", "splat_cloud.frag")
+        self._programs: dict[Splatting, moderngl.Program] = {}
 
     def draw(
         self, instances: Instances, splats: PosedSplats, camera: Camera,
@@ -188,8 +188,16 @@ class CloudPass:
         self._context.enable_only(moderngl.BLEND)
         # behind what is there: as much as that lets through
         self._context.blend_func = moderngl.ONE_MINUS_DST_ALPHA, moderngl.ONE
-        set_uniforms(
-            self._program, **splats.rest.splatting._asdict(),
-            resolution=(camera.width, camera.height), top=0.0,
-        )  # fmt: skip
-        instances.draw(self._program)
+        program = self._program(splats.rest.splatting)
+        set_uniforms(program, resolution=(camera.width, camera.height))
+        instances.draw(program, 3)
+
+    def _program(self, kind: Splatting) -> moderngl.Program:
+        """Compiled with the numbers in it: emulated, to look them up takes a tenth of the time."""
+        assert kind.tail == 0, "the shader subtracts none"
+        if kind not in self._programs:
+            self._programs[kind] = build_program(
+                self._context, "splat_cloud.vert", "splat_cloud.frag",
+                f"MOST {kind.most!r}", f"LEAST {kind.least!r}",
+            )  # fmt: skip
+        return self._programs[kind]
