@@ -25,7 +25,7 @@ class Releasable(Protocol):
 
 T = TypeVar("T", bound=Releasable)
 
-MOST_KEPT = 64  # copies; where every frame brings new things, the older ones go by themselves
+MOST_KEPT = 1024  # copies: a frame of a hundred objects; what nobody sweeps away ends there
 
 
 class Uploads:
@@ -72,13 +72,6 @@ class Stream:
         self.buffer.release()
         self.buffer = self._context.buffer(reserve=size, dynamic=True)
         return True
-
-    def write(self, data: np.ndarray) -> bool:
-        """Replaces the contents; whether that made a new buffer."""
-        is_new = self.reserve(max(data.nbytes, 4))
-        if data.nbytes:
-            self.buffer.write(np.ascontiguousarray(data))
-        return is_new
 
 
 # Projected Gaussians in a buffer on the GPU, each drawn as a rectangle or a triangle.

@@ -9,6 +9,7 @@ OpenGL 3.3 core, without storage buffers, compute or geometry shaders, so that m
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
@@ -108,6 +109,7 @@ class SplatPass:
         self._layered = LayeredPass(context, self.uploads, limit)
         self._cloud = CloudPass(context)
         self._pictures: dict[bool, _Target] = {}
+        self._orders: WeakKeyDictionary[PosedSplats, np.ndarray] = WeakKeyDictionary()
         # Without a window, transform feedback needs some framebuffer; and none that is bound may
         # be released.
         self._idle = context.framebuffer([context.texture((1, 1), 4)])
@@ -125,7 +127,7 @@ class SplatPass:
         _ = self._context.error  # whatever somebody else has left
         is_layered = splats.is_layered
         target = self._sized(is_layered, (camera.width, camera.height))
-        order = None if is_layered else near_to_far(splats)
+        order = None if is_layered else self._sorted(splats)
         instances = self._project.draw(splats, camera, photo_camera, order)
         if is_layered:
             cameras = (camera, photo_camera)
@@ -140,6 +142,12 @@ class SplatPass:
     def sweep(self) -> None:
         """Releases the objects that have not been drawn since the last time."""
         self.uploads.sweep()
+
+    def _sorted(self, splats: PosedSplats) -> np.ndarray:
+        """The order of the Gaussians, the same array as long as they are the same."""
+        if splats not in self._orders:
+            self._orders[splats] = near_to_far(splats)
+        return self._orders[splats]
 
     def _sized(self, is_layered: bool, size: tuple[int, int]) -> _Target:
         """The picture to draw into; made anew when the canvas has changed."""
