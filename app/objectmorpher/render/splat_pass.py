@@ -91,7 +91,7 @@ def _depths(first, last, x, control_points, weights, nodes, plane, out):
 class SplatPicture:
     """A rendered object on the GPU. Row 0 is the top row of the picture."""
 
-    color: moderngl.Texture  # RGBA, 16 or 32 bits, premultiplied sRGB
+    color: moderngl.Texture  # RGBA, 16 bits, premultiplied sRGB
     # RGBA, 32 bits: depth, world units, 0 where nothing is; share that shows the photo; px of the
     # photo to where it looks (2). None of an object without layers.
     detail: moderngl.Texture | None
@@ -160,11 +160,15 @@ class SplatPass:
 
 
 class _Target:
-    """A picture's textures. Sums of thousands of Gaussians need 32 bits, finished ones 16."""
+    """A picture's textures. Finished layers need 16 bits; so do Gaussians that are put together.
+
+    As fractions, not as floating point: of thousands of the faintest on one pixel the sum is right
+    to 0.4 / 255, with half floats to 25 / 255.
+    """
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], is_layered: bool) -> None:
         self.size = size
-        types = ("f2", "f4") if is_layered else ("f4",)
+        types = ("f2", "f4") if is_layered else ("nu2",)
         self.textures = [context.texture(size, 4, dtype=bits) for bits in types]
         for texture in self.textures:
             texture.filter = moderngl.NEAREST, moderngl.NEAREST
