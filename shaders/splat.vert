@@ -3,10 +3,6 @@
 //
 // LAYER: of the asset's layers the one that is drawn; IS_FRONT: whether its front is looked for.
 
-#ifndef LAYER
-#define LAYER 0
-#endif
-
 in vec4 p_centre;  // see splat_project.vert
 in vec4 p_kernel;
 in vec4 p_axes;

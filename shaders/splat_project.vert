@@ -5,6 +5,8 @@
 // 32 bits are enough because nothing is computed as a difference of large numbers: the motion is
 // one from the rest, and the covariance is kept as a factor `root` with Sigma = root root^T, so
 // that determinants are lengths of cross products.
+//
+// IS_PLAIN: nothing is computed but what a plain colour needs.
 
 in vec4 place;   // xyz object frame, opacity
 in vec4 quat;    // wxyz
@@ -62,10 +64,12 @@ out vec4 p_centre;  // CX, CY, QXX, TILT
 out vec4 p_kernel;  // RYY, WEIGHT, CUT, FRONT
 out vec4 p_axes;    // view px, the half-axes of the ellipse outside which alpha is 0
 out vec4 p_color;   // RED, GREEN, BLUE, how much is not SEEN
+#ifndef IS_PLAIN
 out vec4 p_depth;   // Z, ZX, ZY, what MAGNIFIED / sharp is more than 1
 out vec4 p_shift;   // SX, SY, PHOTO, BODY
 out vec4 p_slope;   // AXX, AXY, AYX, AYY
 out vec3 p_edge;    // how much is not MATTED, SOLID of that; ASIDE
+#endif
 
 float ramp(float value, float zero, float one) {
     float t = clamp((value - zero) / (one - zero), 0.0, 1.0);
@@ -125,6 +129,11 @@ void main() {
     vec3 g1 = j * (motion[1] - side.y * motion[2]) * root;
     vec3 across = cross(g0, g1);
     float sxx = dot(g0, g0), sxy = dot(g0, g1), syy = dot(g1, g1), area = dot(across, across);
+    float fdet = area + low_pass * (sxx + syy) + low_pass * low_pass;
+    float fxx = sxx + low_pass, fyy = syy + low_pass;
+    float weight = opacity * (is_compensated ? sqrt(area / fdet) : 1.0), both = 1.0;
+
+#ifndef IS_PLAIN
     float extra = ridge * (sxx + syy) + 1e-12;
     float det = area + extra * (sxx + syy) + extra * extra;
     vec3 k0 = (cross(g1, across) + extra * g0) / det, k1 = (cross(across, g0) + extra * g1) / det;
@@ -160,9 +169,6 @@ void main() {
     // the rules that decide weights and shares
     float solidity = is_layered ? look.z : 1.0;  // no brim where no photo is carried
     if (is_edged && seen == 0.0) cosine = min(cosine, turn);
-    float fdet = area + low_pass * (sxx + syy) + low_pass * low_pass;
-    float fxx = sxx + low_pass, fyy = syy + low_pass;
-    float weight = opacity * (is_compensated ? sqrt(area / fdet) : 1.0);
     float photo = ramp(stretch, streak_end, streak_start);
     float front = 1.0, brim = ramp(abs(cosine), brim_end, brim_start);
     if (is_edged) brim = ramp(abs(cosine), edged_end, edged_start);
@@ -181,7 +187,17 @@ void main() {
         seen = 1.0;
     }
     float body = (1.0 - photo) * solidity;
-    float ends = tail + least / max(weight, 1e-30), both = photo + body;
+    both = photo + body;
+    vec3 along_depth = motion[2] * root;
+    p_depth = vec4(at.z, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
+    p_shift = vec4(looks - photo_focal * sideways, photo, body);
+    p_slope = vec4(axx, axy, ayx, ayy);
+    p_edge = vec3(1.0 - matted, solidity, is_aside ? 1.0 : 0.0);
+#else
+    seen = 1.0;
+#endif
+
+    float ends = tail + least / max(weight, 1e-30);
     bool is_there = at.z > nearest && weight * both > 0.0 && ends < 1.0 && weight < 1e30;
     float cut = is_there ? -2.0 * log(ends) : 0.0;
     float first = tail + max(least_front / (weight * both), least / weight);
@@ -190,11 +206,6 @@ void main() {
     p_kernel = vec4(1.0 / fyy, is_there ? weight : 0.0, cut, first < 1.0 ? -2.0 * log(first) : -1.0);
     p_axes = axes(vec3(fxx, sxy, fyy), fdet, cut);
     p_color = vec4(paint.rgb, 1.0 - seen);
-    vec3 along_depth = motion[2] * root;
-    p_depth = vec4(at.z, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
-    p_shift = vec4(looks - photo_focal * sideways, photo, body);
-    p_slope = vec4(axx, axy, ayx, ayy);
-    p_edge = vec3(1.0 - matted, solidity, is_aside ? 1.0 : 0.0);
     if (!is_there || any(isnan(p_centre)) || any(isinf(p_centre)) || any(isnan(p_axes)))
         p_kernel = vec4(1.0, 0.0, 0.0, -1.0);
 }

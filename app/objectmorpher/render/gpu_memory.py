@@ -25,7 +25,7 @@ class Releasable(Protocol):
 
 T = TypeVar("T", bound=Releasable)
 
-MOST_KEPT = 64  # copies; where every frame brings new things, the older ones go by themselves
+MOST_KEPT = 1024  # copies: a frame of a hundred objects; what nobody sweeps away ends there
 
 
 class Uploads:
@@ -73,15 +73,8 @@ class Stream:
         self.buffer = self._context.buffer(reserve=size, dynamic=True)
         return True
 
-    def write(self, data: np.ndarray) -> bool:
-        """Replaces the contents; whether that made a new buffer."""
-        is_new = self.reserve(max(data.nbytes, 4))
-        if data.nbytes:
-            self.buffer.write(np.ascontiguousarray(data))
-        return is_new
 
-
-# Projected Gaussians in a buffer on the GPU, each drawn as a rectangle.
+# Projected Gaussians in a buffer on the GPU, each drawn as a rectangle or a triangle.
 
 Columns = tuple[tuple[str, str], ...]  # name and format of each column of a buffer
 
@@ -114,13 +107,14 @@ class Instances:
         """Read all rows, which waits for the GPU."""
         return self._stream.buffer.read(self.count * self.row_size)
 
-    def draw(self, program: moderngl.Program) -> None:
+    def draw(self, program: moderngl.Program, corners: int) -> None:
+        """Draw each row as a shape of 3 or 4 corners."""
         if self.count == 0:
             return
         if program.glo not in self._arrays:
             layout = buffer_layout(program, self._stream.buffer, self.columns, "/i")
             self._arrays[program.glo] = self._context.vertex_array(program, [layout])
-        self._arrays[program.glo].render(moderngl.TRIANGLE_STRIP, 4, instances=self.count)
+        self._arrays[program.glo].render(moderngl.TRIANGLE_STRIP, corners, instances=self.count)
 
 
 # Pictures on the GPU, uploaded when the array is not the last one.

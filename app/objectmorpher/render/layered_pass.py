@@ -103,12 +103,12 @@ class LayeredPass:
             self._context.enable_only(moderngl.DEPTH_TEST)
             self._context.depth_func = "<"
             defines = (f"LAYER {layer}", "IS_FRONT")
-            instances.draw(self._program("splat.vert", "splat_front.frag", defines, values))
+            instances.draw(self._program("splat.vert", "splat_front.frag", defines, values), 4)
         targets.sum_buffer.use()
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
         defines = (f"LAYER {layer}", *kind)
-        instances.draw(self._program("splat.vert", "splat_sum.frag", defines, values))
+        instances.draw(self._program("splat.vert", "splat_sum.frag", defines, values), 4)
 
         targets.layer_buffers[own].use()
         for texture, unit in zip(targets.sums, SUMS, strict=True):

@@ -1,8 +1,8 @@
 """Gaussians onto the screen, once each: shaders/splat_project.vert by transform feedback.
 
-What does not change lies on the GPU; of a frame come the table of control points, a few matrices
-and, where the Gaussians have to be sorted, their order. The results are the instances that the
-other passes draw.
+What does not change lies on the GPU; of a new pose come the table of control points and, where the
+Gaussians have to be sorted, their order, and of a frame only a few matrices. The results are the
+instances that the other passes draw.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.base.arrays import F32, frozen
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.deform.binding import Binding
 from objectmorpher_core.deform.jacobians import LEAST_STRETCH, MOST_STRETCH
@@ -21,7 +21,7 @@ from objectmorpher_core.raster import posed
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.rules import RULES
 
-from .gpu_memory import Columns, Instances, Stream, Uploads
+from .gpu_memory import Columns, Instances, Uploads
 from .shaders import buffer_layout, build_feedback, set_uniforms
 
 PLAIN: Columns = (("p_centre", "4f"), ("p_kernel", "4f"), ("p_axes", "4f"), ("p_color", "4f"))
@@ -45,14 +45,15 @@ class ProjectPass:
     def __init__(self, context: moderngl.Context, uploads: Uploads) -> None:
         self._context, self._uploads = context, uploads
         self._programs: dict[tuple[str, bool], moderngl.Program] = {}
-        self._order, self._given = Stream(context), Stream(context)
-        self._nodes = context.texture((2, 1), 4, dtype="f4")
         self._plain, self._layered = Instances(context, PLAIN), Instances(context, LAYERED)
 
     def draw(
         self, splats: PosedSplats, camera: Camera, photo_camera: Camera, order: np.ndarray | None
     ) -> Instances:
-        """Draw all Gaussians, or the rows `order` (M,) u32 in that order, without layers."""
+        """Draw all Gaussians, or the rows `order` (M,) u32 in that order, without layers.
+
+        The order is uploaded if it is another array than before.
+        """
         count = len(splats) if order is None else len(order)
         instances = self._layered if order is None else self._plain
         output = instances.reserve(count)
@@ -62,17 +63,20 @@ class ProjectPass:
         name = "skin" if isinstance(motion, Skin) else "none" if motion is None else "given"
         program = self._program(name, order is None)
         uniforms = _uniforms(splats, camera, photo_camera)
-        content = self._rest(program, splats.rest, photo_camera)
+        content = self._rest(program, splats.rest, photo_camera, order is None)
         if isinstance(motion, Skin):
             content += self._bound(program, motion.binding)
-            uniforms |= self._moved(motion.motion)
+            pose = self._uploads(
+                "pose", motion.motion, lambda: PoseTable(self._context, motion.motion)
+            )
+            pose.texture.use(0)
+            uniforms |= pose.uniforms
         elif isinstance(motion, Skinned):
-            self._given.write(_table_given(splats.rest, motion))
-            content.append(buffer_layout(program, self._given.buffer, GIVEN))
+            content.append(buffer_layout(program, self._given(splats.rest, motion), GIVEN))
         set_uniforms(program, **uniforms)
+        index = None
         if order is not None:
-            self._order.write(order)
-        index = None if order is None else self._order.buffer
+            index = self._uploads("order", order, lambda: self._context.buffer(frozen(order)))
         array = self._context.vertex_array(program, content, index_buffer=index)
         array.transform(output, moderngl.POINTS, vertices=count)
         array.release()
@@ -82,24 +86,29 @@ class ProjectPass:
         key = (motion, is_layered)
         if key not in self._programs:
             names = [name for name, _ in (LAYERED if is_layered else PLAIN)]
+            defines = () if is_layered else ("IS_PLAIN",)
             self._programs[key] = build_feedback(
-                self._context, "splat_project.vert", names, MOTION=f"motion_{motion}.glsl"
-            )
+                self._context, "splat_project.vert", names, *defines,
+                MOTION=f"motion_{motion}.glsl",
+            )  # fmt: skip
             stretches = (LEAST_STRETCH, MOST_STRETCH)
             set_uniforms(self._programs[key], **RULES._asdict(), nodes=0, stretches=stretches)
         return self._programs[key]
 
-    def _rest(self, program: moderngl.Program, rest: RestSplats, photo: Camera) -> list[Any]:
+    def _rest(
+        self, program: moderngl.Program, rest: RestSplats, photo: Camera, is_layered: bool
+    ) -> list[Any]:
         """What does not depend on the motion. Paint changes none of it but its own."""
         uploads, buffer = self._uploads, self._context.buffer
         geometry = uploads("geometry", rest.means, lambda: buffer(_table_geometry(rest, photo)))
         paint = uploads("paint", rest, lambda: buffer(_table_paint(rest)))
-        sides = uploads("sides", rest.means, lambda: buffer(_table_sides(rest, photo)))
-        return [
-            buffer_layout(program, geometry, GEOMETRY),
-            buffer_layout(program, paint, PAINT),
-            buffer_layout(program, sides, SIDES),
-        ]
+        content = [
+            buffer_layout(program, geometry, GEOMETRY), buffer_layout(program, paint, PAINT)
+        ]  # fmt: skip
+        if is_layered:
+            sides = uploads("sides", rest.means, lambda: buffer(_table_sides(rest, photo)))
+            content.append(buffer_layout(program, sides, SIDES))
+        return content
 
     def _bound(self, program: moderngl.Program, binding: Binding) -> list[Any]:
         uploads, buffer = self._uploads, self._context.buffer
@@ -107,16 +116,24 @@ class ProjectPass:
         shares = uploads("shares", binding, lambda: buffer(_table_shares(binding)))
         return [buffer_layout(program, nodes, NODES), buffer_layout(program, shares, SHARES)]
 
-    def _moved(self, motion: Motion) -> Uniforms:
-        """The table of control points is uploaded."""
+    def _given(self, rest: RestSplats, motion: Skinned) -> moderngl.Buffer:
+        return self._uploads(
+            "given", motion, lambda: self._context.buffer(_table_given(rest, motion))
+        )
+
+
+class PoseTable:
+    """Where the control points are, on the GPU: a row of the texture each, see `nodes_of`."""
+
+    def __init__(self, context: moderngl.Context, motion: Motion) -> None:
         table, frame = nodes_of(motion)
-        if self._nodes.height != len(table):
-            self._nodes.release()
-            self._nodes = self._context.texture((2, len(table)), 4, dtype="f4")
-            self._nodes.filter = moderngl.NEAREST, moderngl.NEAREST
-        self._nodes.write(np.ascontiguousarray(table, np.float32))
-        self._nodes.use(0)
-        return {"centre": tuple(frame[0]), "drift": tuple(frame[1])}
+        self.uniforms: Uniforms = {"centre": tuple(frame[0]), "drift": tuple(frame[1])}
+        data = np.ascontiguousarray(table, np.float32)
+        self.texture = context.texture((2, len(table)), 4, data, dtype="f4")
+        self.texture.filter = moderngl.NEAREST, moderngl.NEAREST
+
+    def release(self) -> None:
+        self.texture.release()
 
 
 def _uniforms(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Uniforms:

@@ -25,10 +25,11 @@ def build_program(
 
 
 def build_feedback(
-    context: moderngl.Context, vertex: str, outputs: Sequence[str], **files: str
+    context: moderngl.Context, vertex: str, outputs: Sequence[str], *defines: str, **files: str
 ) -> moderngl.Program:
     """The program of a vertex shader alone, whose `outputs` are captured one after the other."""
-    return context.program(vertex_shader=source(vertex, **files), varyings=tuple(outputs))
+    text = source(vertex, *defines, **files)
+    return context.program(vertex_shader=text, varyings=tuple(outputs))
 
 
 def source(name: str, *defines: str, **files: str) -> str:

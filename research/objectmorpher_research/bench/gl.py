@@ -49,6 +49,7 @@ class Drawer:
 
         def frame(k: int) -> None:
             splat_pass.draw(scene.splats(k), scene.texture, scene.camera, photo)
+            splat_pass.sweep()  # as after each frame of the window
             self._context.finish()
 
         sort = measure(lambda _: depth_order(depths), effort)

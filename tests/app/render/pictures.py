@@ -39,9 +39,10 @@ def premultiplied(picture: Picture3D) -> F32:
 
 def pixels_of(texture: Any) -> F32:
     """(h, w, 4) of a texture of 16 or 32 bits."""
-    bits = np.float16 if texture.dtype == "f2" else np.float32
+    bits = {"f2": np.float16, "f4": np.float32, "nu2": np.uint16}[texture.dtype]
     pixels = np.frombuffer(texture.read(), bits).reshape(texture.height, texture.width, 4)
-    return pixels.astype(np.float32)
+    most = 65535 if texture.dtype == "nu2" else 1
+    return pixels.astype(np.float32) / np.float32(most)
 
 
 @cache

@@ -218,7 +218,7 @@ def test_what_is_not_drawn_any_more_is_released(context):
     own.sweep()
     few = len(own.uploads)
     own.sweep()
-    assert (few, len(own.uploads)) == (3, 0)  # geometry, colours and no sides; then nothing
+    assert (few, len(own.uploads)) == (4, 0)  # geometry, colours, motion and order; nothing
 
 
 # ---- drivers --------------------------------------------------------------------------------
