@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -10,6 +11,7 @@ import cv2
 import numpy as np
 
 from ..base.arrays import F32, frozen
+from ..base.threads import in_threads
 
 LEAST_LEVEL = 4  # px, shorter side of a picture that is halved again
 MOST_LEVELS = 8
@@ -39,7 +41,22 @@ def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> Textur
 
     `left`, `top`: px in the photo of the crop's corner, which may lie outside it.
     """
-    height, width = alpha.shape
+
+    def rows(first: int, last: int) -> tuple[F32, F32]:
+        return foreground[first:last], alpha[first:last]
+
+    return build_levels_by_rows(rows, alpha.shape, left, top)
+
+
+def build_levels_by_rows(
+    rows: Callable[[int, int], tuple[F32, F32]], shape: tuple[int, ...], left: float, top: float
+) -> TextureLevels:
+    """Build as `build_levels` does, of what nobody has to hold as a whole.
+
+    `rows` are asked for in strips and in threads: from the first to before the last one of a crop
+    of this `shape` (h, w), straight colours and alpha.
+    """
+    height, width = shape
     sizes = [(height, width)]
     while min(sizes[-1]) >= LEAST_LEVEL and len(sizes) < MOST_LEVELS:
         sizes.append((-(-sizes[-1][0] // 2), -(-sizes[-1][1] // 2)))
@@ -47,12 +64,29 @@ def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> Textur
     shapes = np.column_stack([np.array(sizes, np.int64), starts[:-1]])
     texels = np.empty(4 * int(starts[-1]), np.float32)  # a photo's worth: nothing is kept twice
     levels = TextureLevels(texels, shapes, left, top).levels
-    colours = np.ascontiguousarray(foreground, np.float32), np.ascontiguousarray(alpha, np.float32)
-    cv2.mixChannels(list(colours), [levels[0]], [0, 0, 1, 1, 2, 2, 3, 3])
+
+    def fill(first: int, last: int) -> None:
+        parts = [np.ascontiguousarray(part, np.float32) for part in rows(first, last)]
+        cv2.mixChannels(parts, [levels[0][first:last]], [0, 0, 1, 1, 2, 2, 3, 3])
+
+    _in_strips(fill, height)
     for fine, coarse in pairwise(levels):
-        for first in range(0, len(coarse), STRIP):
-            _halve(fine[2 * first : 2 * (first + STRIP)], coarse[first : first + STRIP])
+
+        def halve(first: int, last: int, fine: F32 = fine, coarse: F32 = coarse) -> None:
+            _halve(fine[2 * first : 2 * last], coarse[first:last])
+
+        _in_strips(halve, len(coarse))
     return TextureLevels(frozen(texels), frozen(shapes), left, top)
+
+
+def _in_strips(run: Callable[[int, int], None], height: int) -> None:
+    """Call `run(first, last)` for strips of `height` rows."""
+
+    def several(first: int, last: int) -> None:
+        for strip in range(first, last):
+            run(strip * STRIP, min((strip + 1) * STRIP, height))
+
+    in_threads(several, -(-height // STRIP), parts=4)
 
 
 def _halve(fine: F32, coarse: F32) -> None:

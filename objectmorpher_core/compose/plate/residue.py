@@ -302,9 +302,12 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
     if plate is None:
         return ()
     away = [_away(item, plate.box) for item in document.objects]
+    known = [px for px in away if px is not None]
     if not away:
         return ()
-    beside = plate.hole & (np.min(away, axis=0) >= near)
+    beside = plate.hole.copy()
+    for px in known:  # one after the other: each is as large as the photo
+        beside &= px >= near
     if plate.painted is not None:
         beside &= ~plate.painted
     count, labels, stats, _ = cv2.connectedComponentsWithStats(
@@ -316,9 +319,11 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
         box = (x0, y0, x0 + width, y0 + height)
         inner = (slice(y0, box[3]), slice(x0, box[2]))
         there = labels[inner] == n
-        gaps = [np.where(there, px[inner], np.inf) for px in away]
-        owner = int(np.argmin([gap.min() for gap in gaps]))
-        row, column = np.unravel_index(int(np.argmin(gaps[owner])), there.shape)
+        gaps = [px if px is None else np.where(there, px[inner], np.inf) for px in away]
+        owner = int(np.argmin([np.inf if gap is None else gap.min() for gap in gaps]))
+        gap = gaps[owner]
+        nearest = 0 if gap is None else int(np.argmin(gap))
+        row, column = np.unravel_index(nearest, there.shape)
         foot = np.array([column + x0 + plate.left, row + y0 + plate.top])
         points = _nearest_points(document.objects[owner], document.photo.camera, foot)
         ghosts.append(Ghost(box, there, owner, points, _tint(document, plate, box, there)))
@@ -344,14 +349,15 @@ def tint_of(darker: np.ndarray) -> np.ndarray:
     return np.asarray(np.ptp(darker, axis=-1) / np.maximum(-darker.mean(-1), 1e-6))
 
 
-def _away(item: EditObject, box: Box) -> F32:
-    """(h, w) px of the box to what an object covers."""
-    x0, y0, x1, y1 = box
+def _away(item: EditObject, box: Box) -> F32 | None:
+    """(h, w) px of the box to what an object covers; None where that is nothing."""
     matte = item.matte_here
-    own = None if matte is None else crop(matte.alpha, matte.box, box) > 0
-    if own is None or not own.any():
-        return np.full((y1 - y0, x1 - x0), np.inf, np.float32)
-    return np.asarray(cv2.distanceTransform((~own).astype(np.uint8), cv2.DIST_L2, 5), np.float32)
+    if matte is None:
+        return None
+    bare = ~crop(matte.alpha > 0, matte.box, box)
+    if bare.all():
+        return None
+    return np.asarray(cv2.distanceTransform(bare.view(np.uint8), cv2.DIST_L2, 5), np.float32)
 
 
 def _nearest_points(item: EditObject, camera: Camera, foot: F64 | I64) -> I64:
