@@ -21,7 +21,7 @@ from ...document.model import Document, EditObject, LiftedObject, Matte
 from ...document.placement import down_at
 from ...document.settings import AS_IN_THE_PHOTO, Shadow
 from ...raster.posed import PosedSplats
-from ...raster.texture import TextureLevels, build_levels_by_rows
+from ...raster.texture import TextureLevels, TextureSource
 from ..blend import Box
 from ..plate.plate import cut, overlap, plate_cover
 from ..shadow.fall import Caster
@@ -71,6 +71,11 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
 
     Beside it lie the invented pictures of what was `lifted`, if there are any; over both, paint.
     """
+    return texture_source(matte, lifted).levels()
+
+
+def texture_source(matte: Matte, lifted: LiftedObject | None) -> TextureSource:
+    """What `object_texture` is made of."""
     sides = None if lifted is None else lifted.sides
     if sides is None or not sides.pixels.size:
         box = matte.box
@@ -79,7 +84,7 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
             colours, top = matte.foreground[first:last], box[1] + first
             return _painted(colours, matte, box[0], top), matte.alpha[first:last]
 
-        return build_levels_by_rows(own, matte.alpha.shape, *box[:2])
+        return TextureSource(own, (box[3] - box[1], box[2] - box[0]), *box[:2])
     height, width = sides.pixels.shape[:2]
     other = sides.left, sides.top, sides.left + width, sides.top + height
     left, top = min(matte.left, sides.left), min(matte.top, sides.top)
@@ -97,7 +102,7 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
             cut(colours, box, around)[:] = _continued(matte.foreground, matte.box, around)
         return _painted(colours, matte, *box[:2]), crop(matte.alpha, matte.box, box)
 
-    return build_levels_by_rows(rows, (bottom - top, right - left), left, top)
+    return TextureSource(rows, (bottom - top, right - left), left, top)
 
 
 def _painted(colours: F32, matte: Matte, left: int, top: int) -> F32:

@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
+from ...base.large import LARGE
 from ...base.masks import box_of, disc
 from ...base.threads import core_count
 from ...document.model import Document, EditObject, Matte, Placement, Plate
@@ -67,9 +68,8 @@ def find_residue(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     part, own = pixels[window], covered[window]
     scale = min(1.0, max(SIDE / max(own.shape), LEAST_REACH / reach))
     size = (max(round(own.shape[1] * scale), 1), max(round(own.shape[0] * scale), 1))
-    small = cv2.resize(unit_pixels(part), size, interpolation=cv2.INTER_AREA)
-    share = cv2.resize(own.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    residue = _Surroundings(np.asarray(small, np.float32), share > 0, reach * scale).residue()
+    small, hides = _looked_at(part, own, size)
+    residue = _Surroundings(small, hides, reach * scale).residue()
     wide = cv2.dilate(residue.astype(np.uint8), np.ones((3, 3), np.uint8))
     large = cv2.resize(wide, own.shape[::-1], interpolation=cv2.INTER_NEAREST)
     found[window] = (large > 0) & ~own
@@ -79,6 +79,18 @@ def find_residue(pixels: Pixels, covered: Mask, margin: float) -> Mask:
             x, y, w, h = (int(n) for n in stats[k, :4])
             found |= unlit_strip(pixels, np.asarray(things, np.int32) == k, (x, y, x + w, y + h))
     return found & ~covered
+
+
+def _looked_at(pixels: Pixels, covered: Mask, size: tuple[int, int]) -> tuple[F32, Mask]:
+    """The picture (h, w, 3) of this size in which residue is looked for, and what hides it."""
+    if covered.size <= LARGE:
+        small = cv2.resize(unit_pixels(pixels), size, interpolation=cv2.INTER_AREA)
+        share = cv2.resize(covered.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        return np.asarray(small, np.float32), share > 0
+    # In the photo's own levels: as floats all of it would take 12 bytes a pixel.
+    small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    share = cv2.resize(255 * covered.view(np.uint8), size, interpolation=cv2.INTER_AREA)
+    return unit_pixels(np.asarray(small, pixels.dtype)), share > 0
 
 
 # Where a thing meets the ground no light falls: a fill from there would be as dark. That strip is
@@ -321,8 +333,7 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
         there = labels[inner] == n
         gaps = [px if px is None else np.where(there, px[inner], np.inf) for px in away]
         owner = int(np.argmin([np.inf if gap is None else gap.min() for gap in gaps]))
-        gap = gaps[owner]
-        nearest = 0 if gap is None else int(np.argmin(gap))
+        nearest = 0 if (gap := gaps[owner]) is None else int(np.argmin(gap))
         row, column = np.unravel_index(nearest, there.shape)
         foot = np.array([column + x0 + plate.left, row + y0 + plate.top])
         points = _nearest_points(document.objects[owner], document.photo.camera, foot)
