@@ -67,9 +67,7 @@ def _enlarged(lifted: LiftedObject, times: int, small: Matte, matte: Matte) -> L
     if middle is not None:
         middle = middle / np.array([1, times, times], np.float32)
     if sides is not None:  # its pictures keep their own size, beside the matte of the photo
-        down = (matte.left - small.left, matte.box[3] - small.box[3])
-        is_on = (sides.zoom != 0)[:, None]
-        at = sides.at + np.where(is_on, np.array(down, np.float32), np.float32(0))
-        sides = replace(sides, left=sides.left + down[0], top=sides.top + down[1], at=at)
+        beside, below = sides.left - small.left, sides.top - small.box[3]
+        sides = sides.placed(matte.left + beside, matte.box[3] + below)
     texture = replace(texture, u0=texture.u0 * np.float32(times))
     return replace(lifted, texture=texture, middle=middle, sides=sides)
