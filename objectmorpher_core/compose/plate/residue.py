@@ -90,7 +90,7 @@ def _looked_at(pixels: Pixels, covered: Mask, size: tuple[int, int]) -> tuple[F3
     # In the photo's own levels: as floats all of it would take 12 bytes a pixel.
     small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
     share = cv2.resize(255 * covered.view(np.uint8), size, interpolation=cv2.INTER_AREA)
-    return unit_pixels(np.asarray(small, pixels.dtype)), share > 0
+    return np.divide(small, np.iinfo(pixels.dtype).max, dtype=np.float32), share > 0
 
 
 # Where a thing meets the ground no light falls: a fill from there would be as dark. That strip is
