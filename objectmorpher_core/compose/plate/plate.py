@@ -126,23 +126,30 @@ def _joined(photo: Pixels, fill: Pixels, weight: F32, ring: Mask, margin: float)
     channels = [slice(first, first + count) for first in range(0, 3, count)]
     parts = []
     for own in channels:
+        one, other = (_plane(picture, own) for picture in (photo, fill))
         difference = np.zeros((*ring.shape, count), np.float32)
         for strip in strips:
-            true, new = unit_pixels(photo[strip, :, own]), unit_pixels(fill[strip, :, own])
-            difference[strip] = true - new
+            difference[strip] = unit_pixels(one[strip]) - unit_pixels(other[strip])
             difference[strip] *= ring[strip, :, None]
         parts.append(_coarse(difference, margin))
+        del difference
     small, joined = _coarse_correction(np.dstack(parts), ring, margin), np.empty_like(photo)
     for own in channels:
+        one, other = (_plane(picture, own) for picture in (photo, fill))
         change = _enlarged(np.ascontiguousarray(small[..., own]), ring.shape)
         change = change.reshape(*ring.shape, count)
         for strip in strips:
-            true, new = unit_pixels(photo[strip, :, own]), unit_pixels(fill[strip, :, own])
+            true, new = unit_pixels(one[strip]), unit_pixels(other[strip])
             mixed = true + weight[strip, :, None] * (np.clip(new + change[strip], 0, 1) - true)
             mixed = pixels_from_unit(mixed, photo.dtype)
-            is_invented = weight[strip, :, None] > 0
-            joined[strip, :, own] = np.where(is_invented, mixed, photo[strip, :, own])
+            joined[strip, :, own] = np.where(weight[strip, :, None] > 0, mixed, one[strip])
+        del change
     return joined
+
+
+def _plane(picture: Pixels, own: slice) -> Pixels:
+    """Channels of a picture (h, w, 3): all of them as they are, one of them in one piece."""
+    return picture if own.stop - own.start == 3 else np.ascontiguousarray(picture[..., own])
 
 
 def _window(
