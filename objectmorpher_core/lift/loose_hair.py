@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 
 from ..base.arrays import F32, U8, Mask, Pixels, crop, unit_pixels
 from ..base.camera import Camera
-from ..base.large import LARGE
+from ..base.large import LARGE, reduction
 from ..base.masks import box_of, disc
 from ..base.rotations import quats_along
 from ..base.threads import in_threads
@@ -191,7 +191,9 @@ def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:
     frame, margin = (0, 0, width, height), MARGIN * band_width(width, height)
     covered = crop(matte.alpha, matte.box, frame) > 0
     loose = find_loose_hair(pixels, covered, margin)
-    if hair.mean * np.count_nonzero(loose) < EVIDENCE * hair.root:
+    # As in a smaller picture of what is large: a line is wider there, too.
+    times = reduction(pixels.shape)
+    if hair.mean * np.count_nonzero(loose) < EVIDENCE * hair.root * times:
         return matte  # of a smooth thing even a long line is likely to be none
     own = box_of(loose)
     (x0, y0, x1, y1), (left, top, right, bottom) = matte.box, own
