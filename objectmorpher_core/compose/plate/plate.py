@@ -149,7 +149,7 @@ def _joined(photo: Pixels, fill: Pixels, weight: F32, ring: Mask, margin: float)
 
 def _plane(picture: Pixels, own: slice) -> Pixels:
     """Channels of a picture (h, w, 3): all of them as they are, one of them in one piece."""
-    return picture if own.stop - own.start == 3 else np.ascontiguousarray(picture[..., own])
+    return picture if own.stop - own.start == 3 else picture[..., own].copy()
 
 
 def _window(
