@@ -15,10 +15,11 @@ import numpy as np
 
 from ..base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ..base.camera import Camera
+from ..base.large import LARGE
 from ..base.progress import Progress, silent
 from ..deform.puppet import Puppet, puppet_of
 from ..document.bounds import MULTIPLY, NORMAL, SCREEN
-from ..document.model import Document, EditObject, Matte, Placement, Plate
+from ..document.model import Document, EditObject, LiftedObject, Matte, Placement, Plate
 from ..document.settings import AS_IN_THE_PHOTO, Refined
 from ..document.transparency import alpha_behind
 from ..pictures.image import Picture
@@ -26,6 +27,7 @@ from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
 from ..raster.reference import Picture3D
+from ..raster.texture import TextureRows
 from .blend import FEATHER_START as FEATHER_START
 from .blend import (
     NEAR,
@@ -41,7 +43,7 @@ from .blend import (
 from .blend import STILL as STILL
 from .light.defocus import DETAIL, blurred, reach_of, sharpened
 from .light.harmonize import lit, saturated
-from .light.lighting import NOTHING, Lighting, Lit
+from .light.lighting import NOTHING, Lighting, Lit, texture_source
 from .light.lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
 from .paint import PaintedShare
@@ -196,7 +198,8 @@ class _Drawing:
             if (paint := PaintedShare.of(things[k].matte, shown.splats.rest.lifted)) is not None
         }
         self._textures = {
-            k: object_texture(things[k].matte, things[k].item.lifted) for k in self._drawables
+            k: _Carried(things[k].matte, things[k].item.lifted, shown)
+            for k, shown in self._drawables.items()
         }
         self.box = self._region(camera)
 
@@ -295,12 +298,12 @@ class _Drawing:
         """The rows of an object's picture, as much out of focus or sharper as it is to be."""
         x0, y0, x1, y1 = self.box
         if look.blur <= 0 and look.sharpness <= 0:
-            return tiles.draw(self._drawables[k], self._textures[k], (x0, top, x1, bottom))
+            return self._textures[k].draw((x0, top, x1, bottom))
         # By whole tiles more: what the rasteriser rounds, it rounds tile by tile.
         reach = reach_of(look.blur) + (reach_of(DETAIL) if look.sharpness > 0 else 0)
         rim = -(-reach // TILE) * TILE
         above, below = max(top - rim, y0), min(bottom + rim, y1)
-        picture = tiles.draw(self._drawables[k], self._textures[k], (x0, above, x1, below))
+        picture = self._textures[k].draw((x0, above, x1, below))
         picture = _part(picture, 0, below - above)
         color, alpha = blurred(picture.color, look.blur), blurred(picture.alpha, look.blur)
         soft = replace(
@@ -308,6 +311,22 @@ class _Drawing:
             from_photo=blurred(picture.from_photo, look.blur),
         )  # fmt: skip
         return _part(soft, top - above, bottom - above)
+
+
+class _Carried:
+    """A drawable object with its texture, of which a large one is there only by rows."""
+
+    def __init__(self, matte: Matte, lifted: LiftedObject | None, shown: tiles.Drawable) -> None:
+        source, self._shown = texture_source(matte, lifted), shown
+        is_large = source.shape[0] * source.shape[1] > LARGE
+        self._texture = TextureRows(source) if is_large else source.levels()
+
+    def draw(self, box: Box) -> Picture3D:
+        """The part `box` of the view."""
+        texture = self._texture
+        if isinstance(texture, TextureRows):
+            texture = texture.looked_at(*self._shown.rows_looked_at(box))
+        return tiles.draw(self._shown, texture, box)
 
 
 def _pieces(top: int, bottom: int) -> list[tuple[int, int]]:

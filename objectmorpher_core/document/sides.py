@@ -50,6 +50,12 @@ class Sides:
         real = None if self.real is None else np.pad(self.real, (0, count))
         return replace(self, at=at, slopes=slopes, zoom=zoom, real=real)
 
+    def placed(self, left: int, top: int) -> Sides:
+        """With their pictures elsewhere in the object's texture."""
+        way = np.array([left - self.left, top - self.top], np.float32)
+        at = np.where((self.zoom != 0)[:, None], self.at + way, self.at)
+        return replace(self, left=left, top=top, at=at)
+
     def moved(self, offsets: np.ndarray, linear: np.ndarray | None = None) -> Sides:
         """Of Gaussians that lie `offsets` (N, 3) world units aside, on the same surface.
 

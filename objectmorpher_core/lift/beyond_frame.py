@@ -7,7 +7,7 @@ image, which the cut-out has there, shows eyes and lips twice.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -33,35 +33,59 @@ COARSE = 2.0  # small px, standard deviation
 STRANGE = 20_000.0  # squared levels that a source costs which is not the object
 FAR = 200.0  # squared levels that a source costs for each depth of the strip that it is farther off
 FARTHEST = 3.0  # x the depth, where that ends
+STRIP = 256  # rows that are rounded at a time
 
 
 def cut_out_beyond(pixels: Pixels, mask: Selection, mixed: Mask | None = None) -> Matte:
     """Cut out as `cut_out` does, with colours made for what is beyond the photo's frame."""
-    height, width = mask.shape
-    return with_beyond(cut_out(pixels, mask, mixed), (width, height))
+    matte, size = cut_out(pixels, mask, mixed), (mask.shape[1], mask.shape[0])
+    if (made := _made_beyond(matte, size)) is not None:
+        foreground = matte.foreground.view()  # nobody else has this cut-out yet: not a copy
+        foreground.setflags(write=True)
+        made.put_into(foreground)
+    return matte
 
 
 def with_beyond(matte: Matte, size: tuple[int, int]) -> Matte:
     """Return `matte` with colours made for what of it is beyond a photo of `size` (w, h) px."""
+    made = _made_beyond(matte, size)
+    if made is None:
+        return matte
+    foreground = matte.foreground.copy()
+    made.put_into(foreground)
+    return replace(matte, foreground=foreground)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beyond:
+    """Colours for a part of a matte."""
+
+    window: tuple[slice, slice]  # of the matte
+    there: Mask  # (h, w) of the window
+    colours: U8  # (h, w, 3)
+
+    def put_into(self, foreground: F32) -> None:
+        """Change a matte's colours (H, W, 3) in place."""
+        foreground[self.window][self.there] = np.float32(1 / 255) * self.colours[self.there]
+
+
+def _made_beyond(matte: Matte, size: tuple[int, int]) -> _Beyond | None:
+    """Colours for what of a matte is beyond a photo of `size` (w, h) px; None where nothing is."""
     x0, y0, x1, y1 = matte.box
     depth = float(max(-x0, -y0, x1 - size[0], y1 - size[1]))
     if depth <= 0:
-        return matte
+        return None
     beyond = np.ones(matte.alpha.shape, bool)
     beyond[max(-y0, 0) : size[1] - y0, max(-x0, 0) : size[0] - x0] = False
     shown = matte.alpha > FAINT
     if (beyond & shown).sum() < LEAST or (shown & ~beyond).sum() < LEAST:
-        return matte
+        return None
     away = cv2.distanceTransform((~(beyond & shown)).astype(np.uint8), cv2.DIST_L2, 5)
     near = (away < AROUND * depth) & shown
     x0, y0, x1, y1 = box_of(near)
     window = np.s_[y0:y1, x0:x1]
     made = _filled(matte.foreground[window], matte.alpha[window], beyond[window], depth)
-    if made is None:
-        return matte
-    foreground, there = matte.foreground.copy(), beyond[window]
-    foreground[window][there] = np.float32(1 / 255) * made[there]
-    return replace(matte, foreground=foreground)
+    return None if made is None else _Beyond(window, beyond[window], made)
 
 
 def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float) -> U8 | None:
@@ -72,7 +96,10 @@ def _filled(foreground: F32, alpha: F32, beyond: Mask, depth: float) -> U8 | Non
     height, width = beyond.shape
     scale = min(1.0, (SEARCH / beyond.size) ** 0.5)
     size = max(8, round(width * scale)), max(8, round(height * scale))
-    crop = np.clip(255 * foreground + 0.5, 0, 255).astype(np.uint8)
+    crop = np.empty(foreground.shape, np.uint8)
+    for first in range(0, height, STRIP):
+        strip = slice(first, first + STRIP)
+        crop[strip] = np.clip(255 * foreground[strip] + 0.5, 0, 255)
     # The object's own colours, and what is around it as it ends there.
     own, share = shrunk(crop, ((alpha > FAINT) & ~beyond).astype(np.float32), size)
     small = fill_in(own, share > HALF)

@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 
 from ..base.arrays import F32, U8, Mask, Pixels, crop, unit_pixels
 from ..base.camera import Camera
+from ..base.large import LARGE, reduction
 from ..base.masks import box_of, disc
 from ..base.rotations import quats_along
 from ..base.threads import in_threads
@@ -176,6 +177,9 @@ CONTEXT = 8  # x margin, seen around it
 BEHIND = (0.5, 1.2, 2.5)  # x margin: so far around, what is behind is averaged, the nearest first
 MORE = 1.25  # x the least that it can cover
 FAINTEST = 0.02  # alpha that is kept
+TILE = 1536  # px: what is worked on at a time of a large picture, at 60 bytes a px
+
+Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
 
 def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:
@@ -187,7 +191,9 @@ def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:
     frame, margin = (0, 0, width, height), MARGIN * band_width(width, height)
     covered = crop(matte.alpha, matte.box, frame) > 0
     loose = find_loose_hair(pixels, covered, margin)
-    if hair.mean * np.count_nonzero(loose) < EVIDENCE * hair.root:
+    # As in a smaller picture of what is large: a line is wider there, too.
+    times = reduction(pixels.shape)
+    if hair.mean * np.count_nonzero(loose) < EVIDENCE * hair.root * times:
         return matte  # of a smooth thing even a long line is likely to be none
     own = box_of(loose)
     (x0, y0, x1, y1), (left, top, right, bottom) = matte.box, own
@@ -195,19 +201,39 @@ def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:
     pads = [(y0 - box[1], box[3] - y1), (x0 - box[0], box[2] - x1)]
     alpha = np.pad(matte.alpha, pads)
     foreground = np.pad(matte.foreground, [*pads, (0, 0)], mode="edge")
-    window = np.s_[top - box[1] : bottom - box[1], left - box[0] : right - box[0]]
-    share, colours = _unmixed(pixels, loose, covered, own, margin)
-    is_hair = share > 0
-    alpha[window][is_hair] = share[is_hair]
-    foreground[window][is_hair] = colours[is_hair]
+    for tile in _tiles(own):
+        left, top, right, bottom = tile
+        if loose[top:bottom, left:right].any():
+            window = np.s_[top - box[1] : bottom - box[1], left - box[0] : right - box[0]]
+            context = CONTEXT * margin if tile == own else BEHIND[-1] * margin + 2
+            share, colours = _unmixed(pixels, loose, covered, tile, (margin, context))
+            is_hair = share > 0
+            alpha[window][is_hair] = share[is_hair]
+            foreground[window][is_hair] = colours[is_hair]
     return replace(matte, left=box[0], top=box[1], alpha=alpha, foreground=foreground)
 
 
+def _tiles(box: Box) -> list[Box]:
+    """The parts of a box that are worked on at a time: all of it, where it is not large."""
+    x0, y0, x1, y1 = box
+    side = max(x1 - x0, y1 - y0) if (x1 - x0) * (y1 - y0) <= LARGE else TILE
+    return [
+        (left, top, min(left + side, x1), min(top + side, y1))
+        for top in range(y0, y1, side) for left in range(x0, x1, side)
+    ]  # fmt: skip
+
+
 def _unmixed(
-    pixels: Pixels, loose: Mask, covered: Mask, own: tuple[int, int, int, int], margin: float
+    pixels: Pixels, loose: Mask, covered: Mask, own: Box, reaches: tuple[float, float]
 ) -> tuple[F32, F32]:
-    """Alpha (h, w) and colours (h, w, 3) of the hair that is `loose` (H, W), in its box `own`."""
-    x0, y0, x1, y1 = box_of(loose, int(np.ceil(CONTEXT * margin)))
+    """Alpha (h, w) and colours (h, w, 3) of the hair that is `loose` (H, W), in a box `own`.
+
+    `reaches`: the margin, and how far around the box is looked, px.
+    """
+    (margin, context), (height, width) = reaches, loose.shape
+    around = int(np.ceil(context))
+    x0, y0 = max(own[0] - around, 0), max(own[1] - around, 0)
+    x1, y1 = min(own[2] + around, width), min(own[3] + around, height)
     part = np.s_[y0:y1, x0:x1]
     rgb, there = unit_pixels(pixels[part]), loose[part]
     is_bare = ~covered[part] & (cv2.dilate(there.astype(np.uint8), disc(2)) == 0)

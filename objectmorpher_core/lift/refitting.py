@@ -40,6 +40,7 @@ from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width
 from . import LiftError, LiftSubject, load
 from .beyond_frame import cut_out_beyond
+from .large import lift_subject
 from .loose_hair import with_hair_along, with_loose_hair
 from .registration.imported import ImportTarget, rematted
 from .relief.spreading import BRIM
@@ -412,7 +413,7 @@ def refit_object(
         return matte, replace(shown, backend=lifted.backend)
     lifter = load("relief")  # the only one that knows a middle sheet
     subject = LiftSubject(scene.pixels, camera, is_selected(scene.mask), bare)
-    fresh = lifter.lift(subject, was.shape, part(progress, 0.3, 1.0), seed)
+    fresh = lift_subject(lifter, subject, was.shape, part(progress, 0.3, 1.0), seed)
     fresh = with_hair_along(fresh, bare, whole, camera, seed)
     spacing = lifted.spacing * lifted.scale * camera.focal / float(lifted.centre[2])
     reach = band_width(camera.width, camera.height) + BRIM * spacing

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import mmap
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, frozen
+from ..base.arrays import F32, F64, frozen
+from ..base.threads import in_threads
 
 LEAST_LEVEL = 4  # px, shorter side of a picture that is halved again
 MOST_LEVELS = 8
 STRIP = 128  # rows that are made at a time: a border around all of a photo is a photo more
+BESIDE = 8.0  # px: so far beside a place the full size may be looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,25 +39,143 @@ class TextureLevels:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class TextureSource:
+    """What a texture is made of, by rows: nobody has to hold all of it as straight floats."""
+
+    # From the first to before the last row: straight colours (h, w, 3) in [0, 1] and alpha (h, w);
+    # asked for in strips, and in threads.
+    rows: Callable[[int, int], tuple[F32, F32]]
+    shape: tuple[int, int]  # (h, w)
+    left: float  # px in the photo, corner of the crop
+    top: float
+
+    @cached_property
+    def shapes(self) -> np.ndarray:
+        """As those of `TextureLevels`."""
+        sizes = [self.shape]
+        while min(sizes[-1]) >= LEAST_LEVEL and len(sizes) < MOST_LEVELS:
+            sizes.append((-(-sizes[-1][0] // 2), -(-sizes[-1][1] // 2)))
+        starts = np.cumsum([0, *(h * w for h, w in sizes[:-1])])
+        return frozen(np.column_stack([np.array(sizes, np.int64), starts]))
+
+    @property
+    def size(self) -> int:
+        """Numbers of all the levels."""
+        height, width, first = self.shapes[-1].tolist()
+        return 4 * (first + height * width)
+
+    def fill(self, first: int, last: int, texels: F32) -> None:
+        """Put rows of the full size into `texels` (h, w, 4)."""
+        parts = [np.ascontiguousarray(part, np.float32) for part in self.rows(first, last)]
+        cv2.mixChannels(parts, [texels], [0, 0, 1, 1, 2, 2, 3, 3])
+
+    def levels(self) -> TextureLevels:
+        """The whole texture."""
+        texels = np.empty(self.size, np.float32)  # a photo's worth: nothing is kept twice
+        full, *others = TextureLevels(texels, self.shapes, self.left, self.top).levels
+        _in_strips(lambda first, last: self.fill(first, last, full[first:last]), self.shape[0])
+        _halve_all([full, *others])
+        return TextureLevels(frozen(texels), self.shapes, self.left, self.top)
+
+
 def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> TextureLevels:
     """Texture from straight `foreground` (h, w, 3) in [0, 1] and `alpha` (h, w).
 
     `left`, `top`: px in the photo of the crop's corner, which may lie outside it.
     """
-    height, width = alpha.shape
-    sizes = [(height, width)]
-    while min(sizes[-1]) >= LEAST_LEVEL and len(sizes) < MOST_LEVELS:
-        sizes.append((-(-sizes[-1][0] // 2), -(-sizes[-1][1] // 2)))
-    starts = np.concatenate([[0], np.cumsum([h * w for h, w in sizes])])
-    shapes = np.column_stack([np.array(sizes, np.int64), starts[:-1]])
-    texels = np.empty(4 * int(starts[-1]), np.float32)  # a photo's worth: nothing is kept twice
-    levels = TextureLevels(texels, shapes, left, top).levels
-    colours = np.ascontiguousarray(foreground, np.float32), np.ascontiguousarray(alpha, np.float32)
-    cv2.mixChannels(list(colours), [levels[0]], [0, 0, 1, 1, 2, 2, 3, 3])
+
+    def rows(first: int, last: int) -> tuple[F32, F32]:
+        return foreground[first:last], alpha[first:last]
+
+    return TextureSource(rows, (alpha.shape[0], alpha.shape[1]), left, top).levels()
+
+
+class TextureRows:
+    """A texture of which the full size is there only where it is about to be looked at.
+
+    That is three quarters of it; a picture that is drawn from above to below looks at a few rows at
+    a time. The memory of the others is reserved and not used, and given back where it was.
+    """
+
+    def __init__(self, source: TextureSource) -> None:
+        self._source = source
+        self._memory = _reserved(4 * source.size)
+        texels = np.frombuffer(self._memory, np.float32, source.size)
+        self._texture = TextureLevels(texels, source.shapes, source.left, source.top)
+        self._is_there = np.zeros(-(-source.shape[0] // STRIP), bool)
+        _, half, *others = self._texture.levels
+
+        def halve(first: int, last: int) -> None:
+            rows = slice(2 * first, min(2 * last, source.shape[0]))
+            fine = np.empty((rows.stop - rows.start, source.shape[1], 4), np.float32)
+            source.fill(rows.start, rows.stop, fine)
+            _halve(fine, half[first:last])
+
+        _in_strips(halve, len(half))
+        _halve_all([half, *others])
+
+    def looked_at(self, low: F64, high: F64) -> TextureLevels:
+        """The texture, to be looked at between rows `low` and `high` (N,) px of the photo only.
+
+        What was asked for before is not there any more.
+        """
+        count = len(self._is_there)
+        first, last = (
+            np.floor((rows - self._source.top + beside) / STRIP).clip(-1, count).astype(np.int64)
+            for rows, beside in ((low, -BESIDE), (high, BESIDE))
+        )
+        ends = np.zeros(count + 2, np.int64)
+        np.add.at(ends, first.clip(0), 1)
+        np.add.at(ends, last + 1, -1)
+        wanted = np.cumsum(ends)[:count] > 0
+        for strip in np.flatnonzero(self._is_there & ~wanted):
+            self._give_back(int(strip))
+        missing = np.flatnonzero(wanted & ~self._is_there)
+
+        def fill(first: int, last: int) -> None:
+            for strip in missing[first:last].tolist():
+                top, bottom = strip * STRIP, min((strip + 1) * STRIP, self._source.shape[0])
+                self._source.fill(top, bottom, self._texture.levels[0][top:bottom])
+
+        in_threads(fill, len(missing), parts=4)
+        self._is_there = wanted
+        return replace(self._texture, texels=frozen(self._texture.texels))
+
+    def _give_back(self, strip: int) -> None:
+        """What no other strip has a part of."""
+        width, page = 16 * self._source.shape[1], mmap.PAGESIZE
+        start, end = (strip * STRIP * width, (strip + 1) * STRIP * width)
+        start, end = -(-start // page) * page, end // page * page
+        if start < end <= len(self._memory) and hasattr(self._memory, "madvise"):
+            self._memory.madvise(mmap.MADV_DONTNEED, start, end - start)
+
+
+def _reserved(size: int) -> mmap.mmap:
+    """Bytes that take memory only where they are written."""
+    if sys.platform == "win32":
+        return mmap.mmap(-1, size)
+    return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+
+
+def _halve_all(levels: list[F32]) -> None:
+    """Fill all levels but the first, each from the one before."""
     for fine, coarse in pairwise(levels):
-        for first in range(0, len(coarse), STRIP):
-            _halve(fine[2 * first : 2 * (first + STRIP)], coarse[first : first + STRIP])
-    return TextureLevels(frozen(texels), frozen(shapes), left, top)
+
+        def halve(first: int, last: int, fine: F32 = fine, coarse: F32 = coarse) -> None:
+            _halve(fine[2 * first : 2 * last], coarse[first:last])
+
+        _in_strips(halve, len(coarse))
+
+
+def _in_strips(run: Callable[[int, int], None], height: int) -> None:
+    """Call `run(first, last)` for strips of `height` rows."""
+
+    def several(first: int, last: int) -> None:
+        for strip in range(first, last):
+            run(strip * STRIP, min((strip + 1) * STRIP, height))
+
+    in_threads(several, -(-height // STRIP), parts=4)
 
 
 def _halve(fine: F32, coarse: F32) -> None:

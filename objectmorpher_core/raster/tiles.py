@@ -21,10 +21,11 @@ from .compositing import PhotoLookup
 from .posed import PosedSplats
 from .projection import project
 from .reference import Picture3D
-from .rules import CX, CY, EX, EY, RULES, WEIGHT
+from .rules import AYX, AYY, CX, CY, EX, EY, RULES, SY, WEIGHT
 from .surface import draw_layers
 from .texture import TextureLevels
 
+AROUND = 4.0  # px of the view, by which Gaussians are looked at beside what they colour
 PARTS = 8  # pieces of the picture for each thread: they are not equally full
 
 
@@ -50,6 +51,25 @@ class Drawable:
         if (high <= low).any():
             return None
         return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+    def rows_looked_at(self, box: tuple[int, int, int, int]) -> tuple[F64, F64]:
+        """(M,) between which rows of the photo each Gaussian looks in a `box` of the view.
+
+        And the rows of invented pictures, where it shows one. A pixel looks at a mean of these.
+        """
+        drawn = self.projected[self.projected[:, WEIGHT] > 0].astype(np.float64)
+        if not self.splats.is_layered or not len(drawn):
+            return np.empty(0), np.empty(0)
+        centre, extent = drawn[:, [CX, CY]], drawn[:, [EX, EY]] + AROUND
+        low = np.maximum(centre - extent, box[:2]) - centre
+        high = np.minimum(centre + extent, box[2:]) - centre
+        there = (low <= high).all(1)
+        low, high, drawn = low[there], high[there], drawn[there]
+        ratio = self.photo_camera.focal / self.camera.focal
+        own = (drawn[:, CY] - self.camera.cy) * ratio + self.photo_camera.cy + drawn[:, SY]
+        slope = drawn[:, [AYX, AYY]] + [0.0, ratio]
+        ends = np.stack([slope * low, slope * high])
+        return own + ends.min(0).sum(1), own + ends.max(0).sum(1)
 
 
 def prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:

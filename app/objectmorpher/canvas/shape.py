@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -131,6 +131,8 @@ def rehearse_lift(matte: Matte, lifted: LiftedObject, camera: Camera) -> None:
     )
     part = slice(top, top + 2 * AROUND), slice(left, left + 2 * AROUND)
     small = Matte(matte.left + left, matte.top + top, matte.alpha[part], matte.foreground[part])
+    if (sides := lifted.sides) is not None:  # all between both would be in the texture
+        lifted = replace(lifted, sides=sides.placed(small.left, small.box[3] + AROUND))
     rehearse(build_shape(camera, EditObject("", matte=small, lifted=lifted)), camera)
 
 

@@ -280,6 +280,10 @@ class Tasks:
                 editor.apply(label, editor.derived.solved(now, k, None))
 
         self.make_ready(k, changed, title, show)
+        now = self._editor.document
+        ahead = None if label is not None or now is None else changed(now)
+        if ahead is not None and not self._editor.jobs.is_busy(PLATE):
+            self._ensure_plate_of(ahead)  # the fill need not wait for what is made ready
 
     def make_ready(
         self,
@@ -371,7 +375,10 @@ class Tasks:
     def ensure_plate(self) -> bool:
         """Sees to it that lifted objects have a background behind them; each frame."""
         document = self._editor.document
-        if document is None or document.plate is not None:
+        return document is not None and self._ensure_plate_of(document)
+
+    def _ensure_plate_of(self, document: Document) -> bool:
+        if document.plate is not None:
             return False
         # A fill is of these masks, and of the hints that are in force.
         wanted = (*(o.mask for o in document.objects if o.hides_background), *document.hints)

@@ -14,15 +14,16 @@ import cv2
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ...base.arrays import F32, F64
+from ...base.arrays import F32, F64, crop
 from ...base.camera import Camera
 from ...document.bounds import NORMAL
 from ...document.model import Document, EditObject, LiftedObject, Matte
 from ...document.placement import down_at
 from ...document.settings import AS_IN_THE_PHOTO, Shadow
 from ...raster.posed import PosedSplats
-from ...raster.texture import TextureLevels, build_levels
-from ..plate.plate import plate_cover
+from ...raster.texture import TextureLevels, TextureSource
+from ..blend import Box
+from ..plate.plate import cut, overlap, plate_cover
 from ..shadow.fall import Caster
 from ..shadow.shadow import COARSE, FINE, USUAL_GROUND, Shade, StandingObject
 from ..silhouette import SKETCHED, sketch, sketched
@@ -70,34 +71,55 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
 
     Beside it lie the invented pictures of what was `lifted`, if there are any; over both, paint.
     """
+    return texture_source(matte, lifted).levels()
+
+
+def texture_source(matte: Matte, lifted: LiftedObject | None) -> TextureSource:
+    """What `object_texture` is made of."""
     sides = None if lifted is None else lifted.sides
     if sides is None or not sides.pixels.size:
-        return build_levels(matte.shown, matte.alpha, matte.left, matte.top)
-    (x0, y0, x1, y1), (height, width) = matte.box, sides.pixels.shape[:2]
-    left, top = min(x0, sides.left), min(y0, sides.top)
-    shape = max(y1, sides.top + height) - top, max(x1, sides.left + width) - left
+        box = matte.box
+
+        def own(first: int, last: int) -> tuple[F32, F32]:
+            colours, top = matte.foreground[first:last], box[1] + first
+            return _painted(colours, matte, box[0], top), matte.alpha[first:last]
+
+        return TextureSource(own, (box[3] - box[1], box[2] - box[0]), *box[:2])
+    height, width = sides.pixels.shape[:2]
+    other = sides.left, sides.top, sides.left + width, sides.top + height
+    left, top = min(matte.left, sides.left), min(matte.top, sides.top)
+    right, bottom = max(matte.box[2], other[2]), max(matte.box[3], other[3])
+    picture = np.asarray(sides.pixels / np.float32(255), np.float32)
     # All around them their colours go on: no look-up ever meets what is not the object.
-    above, before = sides.top - top, sides.left - left
-    foreground = cv2.copyMakeBorder(
-        sides.pixels / np.float32(255), above, shape[0] - above - height,
-        before, shape[1] - before - width, cv2.BORDER_REPLICATE,
-    )  # fmt: skip
-    alpha = np.zeros(shape, np.float32)
-    at = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)
-    alpha[at] = matte.alpha
-    near = min(MARGIN, max(sides.top - y1, 0))
-    around = (
-        slice(max(y0 - top - near, 0), y1 - top + near),
-        slice(max(x0 - left - near, 0), x1 - left + near),
-    )
-    own = cv2.copyMakeBorder(matte.foreground, near, near, near, near, cv2.BORDER_REPLICATE)
-    first = max(near - (y0 - top), 0), max(near - (x0 - left), 0)
-    size = foreground[around].shape
-    foreground[around] = own[first[0] :, first[1] :][: size[0], : size[1]]
-    foreground = np.asarray(foreground, np.float32)
-    if matte.paint is not None:
-        foreground = matte.paint.over(foreground, left, top)
-    return build_levels(foreground, alpha, left, top)
+    near = min(MARGIN, max(sides.top - matte.box[3], 0))
+
+    def rows(first: int, last: int) -> tuple[F32, F32]:
+        box = left, top + first, right, top + last
+        colours = _continued(picture, other, box)
+        x0, y0, x1, y1 = matte.box
+        around = overlap((x0 - near, y0 - near, x1 + near, y1 + near), box)
+        if around is not None:
+            cut(colours, box, around)[:] = _continued(matte.foreground, matte.box, around)
+        return _painted(colours, matte, *box[:2]), crop(matte.alpha, matte.box, box)
+
+    return TextureSource(rows, (bottom - top, right - left), left, top)
+
+
+def _painted(colours: F32, matte: Matte, left: int, top: int) -> F32:
+    """Colours (h, w, 3) whose corner is at these px, under the paint of a matte."""
+    return colours if matte.paint is None else matte.paint.over(colours, left, top)
+
+
+def _continued(picture: F32, own: Box, box: Box) -> F32:
+    """The part `box` of a picture (h, w, 3) that covers the box `own`, and goes on beyond it."""
+    height, width = picture.shape[:2]
+    rows = np.arange(box[1] - own[1], box[3] - own[1]).clip(0, height - 1)
+    before, after = max(own[0] - box[0], 0), max(box[2] - own[2], 0)
+    part = picture[rows[0] : rows[-1] + 1, max(box[0] - own[0], 0) : min(box[2] - own[0], width)]
+    above = int(np.count_nonzero(rows == rows[0])) - 1
+    below = len(rows) - above - len(part)
+    bordered = cv2.copyMakeBorder(part, above, below, before, after, cv2.BORDER_REPLICATE)
+    return np.asarray(bordered, np.float32)
 
 
 class Lighting:

@@ -16,7 +16,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, I32, U8, Mask, frozen
+from ...base.arrays import F32, I32, Mask, Pixels, frozen
 from ...base.progress import Progress
 from ...base.threads import in_threads
 from . import patch_search
@@ -76,13 +76,23 @@ class _Level:
         return self.known.shape[1], self.known.shape[0]
 
 
-def shrunk(values: F32 | U8, known: F32, size: tuple[int, int]) -> tuple[F32, F32]:
-    """Values (h, w, C) and how much is known of them (h, w), both at another size (w, h) px."""
+def shrunk(
+    values: F32 | Pixels, known: F32, size: tuple[int, int], unit: float = 1.0
+) -> tuple[F32, F32]:
+    """Values (h, w, C) and how much is known of them (h, w), both at another size (w, h) px.
+
+    What is stored as `unit` is a value of 1.
+    """
     share = np.asarray(cv2.resize(known, size, interpolation=cv2.INTER_AREA), np.float32)
-    weighted = [
-        cv2.resize(values[..., c] * known, size, interpolation=cv2.INTER_AREA)
-        for c in range(values.shape[2])
-    ]
+
+    def weighted_channel(c: int) -> F32:  # one at a time: all of a photo's as floats are 12 bytes
+        channel = values[..., c]
+        if unit != 1:
+            channel = channel.astype(np.float32) / np.float32(unit)
+        small = cv2.resize(channel * known, size, interpolation=cv2.INTER_AREA)
+        return np.asarray(small, np.float32)
+
+    weighted = [weighted_channel(c) for c in range(values.shape[2])]
     mean = np.dstack(weighted) / np.maximum(share, 1e-6)[..., None]
     return np.asarray(mean, np.float32), share
 

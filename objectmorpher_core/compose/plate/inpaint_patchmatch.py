@@ -94,8 +94,8 @@ def _completed(
     height, width = hole.shape
     shrink = min(1.0, (SEARCH_PIXELS / hole.size) ** 0.5)
     size = max(1, round(width * shrink)), max(1, round(height * shrink))
-    levels = crop.astype(np.float32) / np.float32(np.iinfo(crop.dtype).max / 255)
-    small, known = shrunk(levels, (~hole).astype(np.float32), size)
+    known, unit = (~hole).astype(np.float32), np.iinfo(crop.dtype).max / 255
+    small, known = shrunk(crop, known, size, unit)
     scale = size[0] / width, size[1] / height
     guide = _guide(small, known, tuple(hint.moved(0, 0, scale) for hint in hints))
     completion = complete(small, known, guide, seed, progress)

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
+from ...base.large import LARGE
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint
@@ -110,22 +111,45 @@ def build_plate(
         residue[inner] = visible_residue(residue[inner], photo, fill)
         away = distance(covered | residue)
     weight = fill_weight(away[inner].copy(), margin)
+    del away
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true
-    difference = np.zeros(photo.shape, np.float32)
-    strips = [slice(first, first + STRIP) for first in range(0, len(photo), STRIP)]
-    for strip in strips:
-        difference[strip] = unit_pixels(photo[strip]) - unit_pixels(fill[strip])
-        difference[strip] *= ring[strip, :, None]
-    small = _coarse_correction(difference, ring, margin)
-    del difference
-    change, joined = _enlarged(small, ring.shape), np.empty_like(photo)
-    for strip in strips:
-        true, new = unit_pixels(photo[strip]), unit_pixels(fill[strip])
-        mixed = true + weight[strip, :, None] * (np.clip(new + change[strip], 0, 1) - true)
-        mixed = pixels_from_unit(mixed, pixels.dtype)
-        joined[strip] = np.where(is_invented[strip, :, None], mixed, photo[strip])
+    joined = _joined(photo, fill, weight, ring, margin)
     return Plate(x0, y0, joined, is_invented, inpainter.name, seed)
+
+
+def _joined(photo: Pixels, fill: Pixels, weight: F32, ring: Mask, margin: float) -> Pixels:
+    """The photo with its fill (h, w, 3), which takes on the photo's colour at the ring (h, w)."""
+    strips = [slice(first, first + STRIP) for first in range(0, len(photo), STRIP)]
+    # Of a large picture the channels one after the other: each is 4 bytes a pixel.
+    count = 3 if ring.size <= LARGE else 1
+    channels = [slice(first, first + count) for first in range(0, 3, count)]
+    parts = []
+    for own in channels:
+        one, other = (_plane(picture, own) for picture in (photo, fill))
+        difference = np.zeros((*ring.shape, count), np.float32)
+        for strip in strips:
+            difference[strip] = unit_pixels(one[strip]) - unit_pixels(other[strip])
+            difference[strip] *= ring[strip, :, None]
+        parts.append(_coarse(difference, margin))
+        del difference
+    small, joined = _coarse_correction(np.dstack(parts), ring, margin), np.empty_like(photo)
+    for own in channels:
+        one, other = (_plane(picture, own) for picture in (photo, fill))
+        change = _enlarged(np.ascontiguousarray(small[..., own]), ring.shape)
+        change = change.reshape(*ring.shape, count)
+        for strip in strips:
+            true, new = unit_pixels(one[strip]), unit_pixels(other[strip])
+            mixed = true + weight[strip, :, None] * (np.clip(new + change[strip], 0, 1) - true)
+            mixed = pixels_from_unit(mixed, photo.dtype)
+            joined[strip, :, own] = np.where(weight[strip, :, None] > 0, mixed, one[strip])
+        del change
+    return joined
+
+
+def _plane(picture: Pixels, own: slice) -> Pixels:
+    """Channels of a picture (h, w, 3): all of them as they are, one of them in one piece."""
+    return picture if own.stop - own.start == 3 else picture[..., own].copy()
 
 
 def _window(
@@ -152,14 +176,15 @@ def fill_weight(away: F32, margin: float) -> F32:
 
 def correction(difference: F32, ring: Mask, margin: float) -> F32:
     """(h, w, 3) to add to the fill: `difference` (h, w, 3) at the ring, less and less inwards."""
-    return _enlarged(_coarse_correction(difference * ring[..., None], ring, margin), ring.shape)
+    values = _coarse(difference * ring[..., None], margin)
+    return _enlarged(_coarse_correction(values, ring, margin), ring.shape)
 
 
-def _coarse_correction(difference: F32, ring: Mask, margin: float) -> F32:
-    """`correction` of what is 0 beside the ring (h, w, 3), as coarse as the margin allows."""
+def _coarse_correction(values: F32, ring: Mask, margin: float) -> F32:
+    """`correction` (h, w, 3) of `_coarse` values that are 0 beside the ring (H, W)."""
     if not ring.any():
         return np.zeros((1, 1, 3), np.float32)
-    known, values = _coarse(ring.astype(np.float32), margin), _coarse(difference, margin)
+    known = _coarse(ring.astype(np.float32), margin)
     mean, near = _spread(values, known, REACH * margin * _coarseness(margin))
     mean *= near[..., None]
     return mean

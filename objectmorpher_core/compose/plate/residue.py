@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
+from ...base.large import LARGE
 from ...base.masks import box_of, disc
 from ...base.threads import core_count
 from ...document.model import Document, EditObject, Matte, Placement, Plate
@@ -67,9 +68,8 @@ def find_residue(pixels: Pixels, covered: Mask, margin: float) -> Mask:
     part, own = pixels[window], covered[window]
     scale = min(1.0, max(SIDE / max(own.shape), LEAST_REACH / reach))
     size = (max(round(own.shape[1] * scale), 1), max(round(own.shape[0] * scale), 1))
-    small = cv2.resize(unit_pixels(part), size, interpolation=cv2.INTER_AREA)
-    share = cv2.resize(own.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    residue = _Surroundings(np.asarray(small, np.float32), share > 0, reach * scale).residue()
+    small, hides = _looked_at(part, own, size)
+    residue = _Surroundings(small, hides, reach * scale).residue()
     wide = cv2.dilate(residue.astype(np.uint8), np.ones((3, 3), np.uint8))
     large = cv2.resize(wide, own.shape[::-1], interpolation=cv2.INTER_NEAREST)
     found[window] = (large > 0) & ~own
@@ -79,6 +79,18 @@ def find_residue(pixels: Pixels, covered: Mask, margin: float) -> Mask:
             x, y, w, h = (int(n) for n in stats[k, :4])
             found |= unlit_strip(pixels, np.asarray(things, np.int32) == k, (x, y, x + w, y + h))
     return found & ~covered
+
+
+def _looked_at(pixels: Pixels, covered: Mask, size: tuple[int, int]) -> tuple[F32, Mask]:
+    """The picture (h, w, 3) of this size in which residue is looked for, and what hides it."""
+    if covered.size <= LARGE:
+        small = cv2.resize(unit_pixels(pixels), size, interpolation=cv2.INTER_AREA)
+        share = cv2.resize(covered.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        return np.asarray(small, np.float32), share > 0
+    # In the photo's own levels: as floats all of it would take 12 bytes a pixel.
+    small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    share = cv2.resize(255 * covered.view(np.uint8), size, interpolation=cv2.INTER_AREA)
+    return np.divide(small, np.iinfo(pixels.dtype).max, dtype=np.float32), share > 0
 
 
 # Where a thing meets the ground no light falls: a fill from there would be as dark. That strip is
@@ -302,9 +314,12 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
     if plate is None:
         return ()
     away = [_away(item, plate.box) for item in document.objects]
+    known = [px for px in away if px is not None]
     if not away:
         return ()
-    beside = plate.hole & (np.min(away, axis=0) >= near)
+    beside = plate.hole.copy()
+    for px in known:  # one after the other: each is as large as the photo
+        beside &= px >= near
     if plate.painted is not None:
         beside &= ~plate.painted
     count, labels, stats, _ = cv2.connectedComponentsWithStats(
@@ -316,9 +331,10 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
         box = (x0, y0, x0 + width, y0 + height)
         inner = (slice(y0, box[3]), slice(x0, box[2]))
         there = labels[inner] == n
-        gaps = [np.where(there, px[inner], np.inf) for px in away]
-        owner = int(np.argmin([gap.min() for gap in gaps]))
-        row, column = np.unravel_index(int(np.argmin(gaps[owner])), there.shape)
+        gaps = [px if px is None else np.where(there, px[inner], np.inf) for px in away]
+        owner = int(np.argmin([np.inf if gap is None else gap.min() for gap in gaps]))
+        nearest = 0 if (gap := gaps[owner]) is None else int(np.argmin(gap))
+        row, column = np.unravel_index(nearest, there.shape)
         foot = np.array([column + x0 + plate.left, row + y0 + plate.top])
         points = _nearest_points(document.objects[owner], document.photo.camera, foot)
         ghosts.append(Ghost(box, there, owner, points, _tint(document, plate, box, there)))
@@ -344,14 +360,15 @@ def tint_of(darker: np.ndarray) -> np.ndarray:
     return np.asarray(np.ptp(darker, axis=-1) / np.maximum(-darker.mean(-1), 1e-6))
 
 
-def _away(item: EditObject, box: Box) -> F32:
-    """(h, w) px of the box to what an object covers."""
-    x0, y0, x1, y1 = box
+def _away(item: EditObject, box: Box) -> F32 | None:
+    """(h, w) px of the box to what an object covers; None where that is nothing."""
     matte = item.matte_here
-    own = None if matte is None else crop(matte.alpha, matte.box, box) > 0
-    if own is None or not own.any():
-        return np.full((y1 - y0, x1 - x0), np.inf, np.float32)
-    return np.asarray(cv2.distanceTransform((~own).astype(np.uint8), cv2.DIST_L2, 5), np.float32)
+    if matte is None:
+        return None
+    bare = ~crop(matte.alpha > 0, matte.box, box)
+    if bare.all():
+        return None
+    return np.asarray(cv2.distanceTransform(bare.view(np.uint8), cv2.DIST_L2, 5), np.float32)
 
 
 def _nearest_points(item: EditObject, camera: Camera, foot: F64 | I64) -> I64:

@@ -31,6 +31,7 @@ from ...raster.texture import build_levels
 from ...segment.mask_edit import is_selected
 from ...segment.matting.matte import cut_out
 from .. import Lifter, LiftError, LiftSubject
+from ..large import lift_subject
 from .placement import Hints, Registrar
 from .search import angles
 from .sketch import Matches, alike
@@ -107,7 +108,7 @@ def with_photo(
     target = Target(other.pixels, mask, other.camera)
     matches = np.hstack(alike((subject.pixels, subject.mask), (other.pixels, mask)))
     cut = cut_out(other.pixels, other.mask)
-    lifted = lifter.lift(subject, settings, part(progress, 0.1, 0.3), seed)
+    lifted = lift_subject(lifter, subject, settings, part(progress, 0.1, 0.3), seed)
     found, pose = settings, None
     for k in range(ROUNDS):
         step = part(progress, 0.3 + 0.7 * k / ROUNDS, 0.3 + 0.7 * (k + 1) / ROUNDS)
@@ -123,7 +124,7 @@ def with_photo(
             np.concatenate([matches, followed.matches]).astype(np.float32),
         )  # fmt: skip
         found = replace(settings, views=(*settings.views, view))
-        lifted = lifter.lift(subject, found, part(step, 0.5, 1.0), seed)
+        lifted = lift_subject(lifter, subject, found, part(step, 0.5, 1.0), seed)
     return found, lifted
 
 

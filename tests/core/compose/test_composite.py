@@ -16,9 +16,13 @@ import pytest
 from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_core.compose import composite as composite_module
 from objectmorpher_core.compose.composite import Composite, composite, straight_cutout
+from objectmorpher_core.compose.light.lighting import texture_source
 from objectmorpher_core.compose.plate.plate import hole_margin
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement, Pose
+from objectmorpher_core.raster import texture as texture_module
+from objectmorpher_core.raster import tiles
+from objectmorpher_core.raster.texture import TextureRows
 from tests import shapes
 from tests.tree import quick
 
@@ -32,6 +36,8 @@ MOVES = {
     "large": Placement(scale=6.0),
     "a hair": Placement(move=(0.4, 0.0)),
     "a little": Placement(move=(1.5, 2.5)),
+    "rolled": Placement(turn=(0.0, 0.0, 90.0)),
+    "turned far": Placement(turn=(60.0, 0.0, 20.0), scale=1.3),
 }
 ROOT = Path(__file__).parents[3]
 masks = pytest.mark.parametrize("name", ["ellipse", "thin", "frame", "parts", "ring"])
@@ -301,6 +307,34 @@ def test_low_strips_show_what_a_high_one_shows(edit, height, monkeypatch):
     cutout = straight_cutout(whole, np.dtype(np.uint8), (640, 480)).astype(int)
     is_seen = before[..., 3] > 64  # straight colours of what is hardly there mean little
     assert (np.abs(cutout - before)[is_seen].max(-1, initial=0) > 1).sum() <= few
+
+
+@pytest.mark.parametrize("edit", quick([*EDITS, "rolled", "turned far"], 3))
+def test_a_texture_that_is_there_only_by_rows_gives_the_same_picture(edit, monkeypatch):
+    monkeypatch.setattr(composite_module, "STRIP", 640 * 32)
+    whole = composite(_edited(edit), {0: _wide().puppet})
+    monkeypatch.setattr(composite_module, "LARGE", 1000)
+    monkeypatch.setattr(texture_module, "STRIP", 8)
+    result = composite(_edited(edit), {0: _wide().puppet})
+    _assert_same(result, whole)
+    assert vars(result.shares) == vars(whole.shares)
+
+
+def test_of_a_texture_by_rows_only_what_is_looked_at_takes_memory(monkeypatch):
+    monkeypatch.setattr(texture_module, "STRIP", 8)
+    scene = _wide()
+    rows = TextureRows(texture_source(scene.matte, scene.lifted))
+    shown = tiles.prepare(scene.puppet.posed(None, Placement()), scene.camera, scene.camera)
+    box = 0, 200, 640, 232
+    low, high = shown.rows_looked_at(box)
+    assert low.min() < 200 and high.max() > 232
+    seen = rows.looked_at(low, high).levels[0].any((1, 2))
+    kept = rows.looked_at(np.array([214.0]), np.array([218.0])).levels[0].any((1, 2))
+    assert 0 < kept.sum() < seen.sum() < 0.6 * len(seen)  # a Gaussian is a few rows high
+    whole = scene.texture.levels[0]
+    first = 200 - int(scene.texture.top)
+    part = rows.looked_at(low, high).levels[0][first : first + 32]
+    assert np.array_equal(part, whole[first : first + 32])
 
 
 def test_every_strip_tells_how_far_it_is(monkeypatch):

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from skimage import data
 
+from objectmorpher_core.base import large
 from objectmorpher_core.base.arrays import F32, Mask, Pixels, crop
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate.plate import hole_margin, plate_cover
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Matte, Photo, Placement, Prompt
+from objectmorpher_core.lift import loose_hair
 from objectmorpher_core.lift.loose_hair import find_loose_hair, with_loose_hair
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import lift_mask, make_plate
@@ -120,6 +122,36 @@ def test_only_what_ends_in_hair_has_hair_beside_it():
     alpha = crop(hairy.alpha, hairy.box, (0, 0, WIDTH, HEIGHT))
     assert np.array_equal(alpha[fur > 0], fur[fur > 0])
     assert (alpha[middle & (fur <= 0)] > 0.2).mean() > 0.8
+
+
+def test_in_tiles_as_on_a_large_photo_it_is_the_same(monkeypatch):
+    cover, _ = _hairs(0)
+    fur = _fur()
+    pixels = _mixed(_ground("blurred", np.random.default_rng(0)), (cover, 20), (fur, 120))
+    matte = Matte(0, 0, fur, np.repeat(fur[..., None], 3, 2))
+    whole = with_loose_hair(pixels, matte)
+    assert whole is not matte
+    monkeypatch.setattr(loose_hair, "LARGE", 1000)
+    monkeypatch.setattr(loose_hair, "TILE", 50)
+    tiled = with_loose_hair(pixels, matte)
+    assert tiled.box == whole.box
+    # A window's sums begin elsewhere, and alpha below the faintest is nothing at all.
+    assert ((tiled.alpha > 0) != (whole.alpha > 0)).mean() < 1e-4
+    both = (tiled.alpha > 0) & (whole.alpha > 0)
+    assert np.abs(tiled.alpha - whole.alpha)[both].max() < 1e-3
+    assert np.abs(tiled.foreground - whole.foreground)[both].max() < 1e-3
+
+
+def test_of_a_large_photo_no_more_is_taken_for_hair_than_of_the_smaller_one(monkeypatch):
+    """Lines are wider there, so that their px count for less beside an outline's length."""
+    cover, _ = _hairs(0)
+    fur = _fur()
+    pixels = _mixed(_ground("blurred", np.random.default_rng(0)), (cover, 20), (fur, 120))
+    matte = Matte(0, 0, fur, np.repeat(fur[..., None], 3, 2))
+    hairy = with_loose_hair(pixels, matte)
+    monkeypatch.setattr(large, "LARGE", 1000)
+    monkeypatch.setattr(large, "ENOUGH", WIDTH * HEIGHT // 100**2)
+    assert with_loose_hair(pixels, matte) is matte is not hairy
 
 
 @pytest.fixture(scope="module")
