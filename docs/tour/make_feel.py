@@ -254,8 +254,9 @@ def main() -> None:
     text = HEAD.format(machine=machine, load=load) + "".join(rows)
     text += f"\nFrom the command to the first frame on the screen: {median(starts):.2f} s "
     text += f"(median of {STARTS}). From a photo of 1 MP on the\n"
-    text += f"screen, clicked at once, to its selection: {median(c[0] for c in clicks):.2f} s; until a closer look "
-    text += f"has settled it: {median(c[1] for c in clicks):.2f} s.\n"
+    first, settled = (median(c[i] for c in clicks) for i in (0, 1))
+    text += f"screen, clicked at once, to its selection: {first:.2f} s; until a closer look has\n"
+    text += f"settled it: {settled:.2f} s.\n"
     (HERE / "feel.md").write_text(text, encoding="utf-8")
     print(text)
 
