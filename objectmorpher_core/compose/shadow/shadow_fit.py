@@ -77,8 +77,8 @@ BIAS = -4.81
 CERTAIN = 5.0  # of that sum, which is enough by itself: none of 437 scenes without a shadow has it
 SHADED = (0.05, 0.25)  # natural logarithm of light that was fitted, over which it becomes a shade
 MOST_TINT = 0.6  # x its darkness: what changes colours by more is another material
-SURE = 2.2  # log odds: 3 of 263 scenes without a shadow have a higher score, of others 3 of 295
-LIKELY = 1.1  # those where somebody has asked for the shadow, sees it outlined, and can refuse
+SURE = 1.8  # log odds: 2 of 263 scenes without a shadow have a higher score, of others 1 of 295
+LIKELY = 1.0  # those where somebody has asked for the shadow, sees it outlined, and can refuse
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,27 +58,32 @@ def look_for_shadow(brightness: F32, colour: F32, cover: F32, free: Mask) -> See
     fields = brightness, colour, cover, free.astype(np.float32)
     mirrored = tuple(np.ascontiguousarray(field[:, ::-1]) for field in fields)
     own, other = _look(fields), _look(mirrored)
-    nearer = [_look(tuple(_enlarged(field) for field in view)) for view in (fields, mirrored)]
+    nearer = [_look(enlarged(view, CLOSER)) for view in (fields, mirrored)]
     odds = np.mean([seen.odds for seen in (own, other, *nearer)])
     return SeenShadow(0.5 * (own.shade + other.shade[:, ::-1]), float(odds))
 
 
 def _look(fields: tuple[F32, ...]) -> SeenShadow:
     """One look at the fields of `look_for_shadow`."""
-    light, colour, cover, free = (_shrunk(field) for field in fields)
-    planes = planes_of(light, colour, cover, free > MOSTLY)
-    shade, odds = _session().run(None, {"planes": planes[None]})
+    shade, odds = _session().run(None, {"planes": seen_planes(fields)[None]})
     chance = 1 / (1 + np.exp(-np.asarray(shade[0], np.float32)))
     whole = cv2.resize(chance, (2 * SIDE, 2 * SIDE), interpolation=cv2.INTER_LINEAR)
     shade_there = _middle(np.asarray(whole, np.float32), *fields[0].shape)
     return SeenShadow(shade_there, float(odds[0]))
 
 
-def _enlarged(field: F32) -> F32:
-    """A field (h, w) or (h, w, n), so much larger that it is seen from nearer."""
-    height, width = field.shape[:2]
-    size = round(CLOSER * width), round(CLOSER * height)
-    return np.asarray(cv2.resize(field, size, interpolation=cv2.INTER_LINEAR), np.float32)
+def seen_planes(fields: tuple[F32, ...]) -> F32:
+    """(PLANES, SIDE, SIDE) what the network sees in the fields of `look_for_shadow`."""
+    light, colour, cover, free = (shrunk(field) for field in fields)
+    return planes_of(light, colour, cover, free > MOSTLY)
+
+
+def enlarged(fields: tuple[F32, ...], closer: float) -> tuple[F32, ...]:
+    """Fields (h, w) or (h, w, n) as they are seen from so much nearer."""
+    height, width = fields[0].shape[:2]
+    size = round(closer * width), round(closer * height)
+    larger = (cv2.resize(field, size, interpolation=cv2.INTER_LINEAR) for field in fields)
+    return tuple(np.asarray(field, np.float32) for field in larger)
 
 
 @cache
@@ -86,7 +91,7 @@ def _session() -> Any:
     return open_session(registry.shadow_network())
 
 
-def _shrunk(field: F32) -> F32:
+def shrunk(field: F32) -> F32:
     """A field (h, w) or (h, w, n) as the network sees it: SIDE cells, at half the resolution."""
     whole = _middle(np.asarray(field, np.float32), 2 * SIDE, 2 * SIDE)
     return np.asarray(cv2.resize(whole, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.float32)

@@ -62,6 +62,8 @@ def _add_shadow(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--scenes", type=int, default=2880, metavar="N", help="to draw, default 2880")
     add("--steps", type=int, default=5000, metavar="N", help="of 32 samples, default 5000")
+    add("--start", type=Path, metavar="ONNX", help="exported weights to go on from")
+    add("--grounds", type=Path, metavar="FOLDER", help="pictures of grounds to draw with")
     add("--seed", type=int, default=0, help="another one draws other scenes")
     _add_run(parser, "shadow.onnx")
 
@@ -290,9 +292,9 @@ def _train_shadow(options: argparse.Namespace) -> None:
         raise UsageError("--scenes and --steps are at least 1, --seed is not negative")
     from ..training.train_shadow import ShadowPlan, export, train
 
-    plan = ShadowPlan(options.scenes, options.steps, seed=options.seed)
+    plan = ShadowPlan(options.scenes, options.steps, seed=options.seed, grounds=options.grounds)
     with progress_bar("training") as progress:
-        net = train(options.folder, plan, options.minutes, progress)
+        net = train(options.folder, plan, options.minutes, progress, options.start)
     output = options.output or options.folder / "shadow.onnx"
     print(f"{output}: {export(net, output)}")
 

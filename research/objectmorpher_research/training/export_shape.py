@@ -105,8 +105,8 @@ def in_bytes(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return whole[best, channels].reshape(weights.shape).astype(np.int8), step
 
 
-def weights_of(path: Path, net: ShapeNet) -> dict[str, torch.Tensor]:
-    """The weights in a file that `export` wrote, as `net.state_dict()` names them.
+def weights_of(path: Path, net: nn.Module) -> dict[str, torch.Tensor]:
+    """The weights in a file that `write_onnx` wrote, as `net.state_dict()` names them.
 
     What an earlier version did not have, whether a thing is flat, stays as `net` has it. Raises
     ValueError for weights of another network.

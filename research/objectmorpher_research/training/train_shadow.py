@@ -7,10 +7,11 @@ so two runs of the same plan are alike, and not the same.
 
 from __future__ import annotations
 
+import hashlib
 import multiprocessing
 import os
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.queues import Queue
 from pathlib import Path
 from queue import Empty
@@ -25,9 +26,9 @@ from torch.nn import functional
 from objectmorpher_core.base.progress import Progress, part, silent
 from objectmorpher_core.compose.shadow.shadow_look import PLANES, SEEN, SIDE
 
-from .export_shape import write_onnx
+from .export_shape import weights_of, write_onnx
 from .shadow_net import ShadowNet
-from .shadows.grounds import Grounds
+from .shadows.grounds import Grounds, photographs
 from .shadows.samples import ShadowSample, make_sample
 from .shadows.scenes import SceneGeometry, make_geometry, packed, unpacked
 from .shadows.solids import silhouettes
@@ -40,6 +41,8 @@ OPEN, OTHER_FILE = 8, 0.25  # files of scenes that are at hand; how often one of
 RING = 16_000  # samples that are kept
 LEAST = 512  # of them, before anything is learned
 RATE, DECAY, STEEPEST = 2e-3, 0.02, 2.0
+GENTLE = 0.35  # x that rate, going on from weights that have learned
+HALF_WAY = 0.5  # from those to the ones that it has learned, is what is exported
 FAINT, CLEAR = 0.06, 0.18  # share of light that is taken, between which a cell is half in shade
 SHADE, MAP = 2.0, 4.0  # more weight of what is in shade, and of the map over the verdict
 LEAST_CELLS = 50.0
@@ -55,6 +58,9 @@ class ShadowPlan:
     steps: int = 5000
     size: int = 32  # samples at a time
     seed: int = 0
+    grounds: Path | None = None  # a folder of pictures of any ground
+    rate: float = RATE
+    start: str = ""  # SHA-256 of the weights from which it goes on
 
 
 class ShadowLosses(NamedTuple):
@@ -132,11 +138,11 @@ def arrays_of(samples: list[ShadowSample]) -> tuple[np.ndarray, np.ndarray, np.n
     )
 
 
-def _make_samples(files: list[Path], seed: int, ready: Queue) -> None:
+def _make_samples(files: list[Path], folder: Path | None, seed: int, ready: Queue) -> None:
     """Make samples for ever."""
     cv2.setNumThreads(1)
     rng = np.random.default_rng(seed)
-    grounds, scenes = Grounds(rng), [_read(rng, files)]
+    grounds, scenes = Grounds(rng, folder=folder), [_read(rng, files)]
     while True:
         if len(scenes) < OPEN:
             scenes.append(_read(rng, files))
@@ -170,13 +176,18 @@ def losses(net: ShadowNet, planes: Tensor, fields: Tensor, labels: Tensor) -> Sh
 class ShadowState:
     """The network, what trains it, and how far it is."""
 
-    def __init__(self, file: Path, plan: ShadowPlan) -> None:
+    def __init__(
+        self, file: Path, plan: ShadowPlan, start: dict[str, Tensor] | None = None
+    ) -> None:
         torch.manual_seed(plan.seed)
         self.file, self.plan, self.step = file, plan, 0
-        self.net = ShadowNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        net = ShadowNet()
+        if start is not None:
+            net.load_state_dict(start)
+        self.net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.mean = {k: v.clone() for k, v in self.net.state_dict().items()}
-        self.optimiser = torch.optim.AdamW(self.net.parameters(), RATE, weight_decay=DECAY)
-        self.loss = 0.0
+        self.optimiser = torch.optim.AdamW(self.net.parameters(), plan.rate, weight_decay=DECAY)
+        self.loss, self.start = 0.0, start
         if file.exists():
             kept = torch.load(file, weights_only=True)
             if kept["plan"] == repr(plan):
@@ -188,7 +199,7 @@ class ShadowState:
         """Take one step."""
         self.net.train()
         for group in self.optimiser.param_groups:
-            group["lr"] = RATE * schedule(self.step / self.plan.steps)
+            group["lr"] = self.plan.rate * schedule(self.step / self.plan.steps)
         parts = losses(self.net, planes, fields, labels)
         whole = MAP * parts.shade + parts.verdict
         self.optimiser.zero_grad(set_to_none=True)
@@ -211,18 +222,36 @@ class ShadowState:
         os.replace(partial, self.file)
 
     def trained(self) -> ShadowNet:
-        """The mean of the weights, ready to predict."""
-        net = ShadowNet()
-        net.load_state_dict(self.mean)
+        """The mean of the weights, ready to predict.
+
+        Gone on from others, it is half way from those: it finds more than either (see
+        docs/compositing).
+        """
+        net, found = ShadowNet(), dict(self.mean)
+        for name, before in (self.start or {}).items():
+            if before.is_floating_point():
+                found[name] = torch.lerp(before, found[name], HALF_WAY)
+        net.load_state_dict(found)
         return net.eval()
 
 
 def train(
-    folder: Path, plan: ShadowPlan, minutes: float | None = None, progress: Progress = silent
-) -> ShadowNet:
-    """Train in `folder`, for so many minutes at most."""
+    folder: Path, plan: ShadowPlan, minutes: float | None = None, progress: Progress = silent,
+    weights: Path | None = None,
+) -> ShadowNet:  # fmt: skip
+    """Train in `folder`, for so many minutes at most.
+
+    `weights`: exported ones to go on from, more gently. Raises ValueError for those of another
+    network, and for a folder of grounds without pictures.
+    """
+    photographs(plan.grounds)  # or there are none
+    start = None
+    if weights is not None:
+        start = weights_of(weights, ShadowNet())
+        digest = hashlib.sha256(weights.read_bytes()).hexdigest()
+        plan = replace(plan, start=digest, rate=GENTLE * plan.rate)
     files = write_scenes(folder / "scenes", plan, part(progress, 0.0, 0.2))
-    state = ShadowState(folder / "shadow.pt", plan)
+    state = ShadowState(folder / "shadow.pt", plan, start)
     begun = saved = time.monotonic()
     spawn, rng = (
         multiprocessing.get_context("spawn"),
@@ -230,7 +259,11 @@ def train(
     )
     ready = spawn.Queue(4)
     makers = [
-        spawn.Process(target=_make_samples, args=(files, plan.seed + 1000 * k, ready), daemon=True)
+        spawn.Process(
+            target=_make_samples,
+            args=(files, plan.grounds, plan.seed + 1000 * k, ready),
+            daemon=True,
+        )
         for k in range(max((os.cpu_count() or 2) - 1, 1))
     ]
     for maker in makers:

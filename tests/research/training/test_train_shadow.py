@@ -4,16 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.special import expit
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from objectmorpher_core.compose.shadow.shadow_look import PLANES, SIDE, THING  # noqa: E402
+from objectmorpher_core.compose.shadow.shadow_look import (  # noqa: E402
+    CELLS,
+    PLANES,
+    SIDE,
+    THING,
+    enlarged,
+    shrunk,
+)
 from objectmorpher_core.models.onnx_session import open_session  # noqa: E402
 from objectmorpher_research.training import train_shadow  # noqa: E402
+from objectmorpher_research.training.export_shape import weights_of  # noqa: E402
+from objectmorpher_research.training.rod_net import RodNet  # noqa: E402
 from objectmorpher_research.training.shadow_net import ShadowNet  # noqa: E402
 from objectmorpher_research.training.shadows import samples, scenes, solids  # noqa: E402
-from objectmorpher_research.training.shadows.grounds import Grounds  # noqa: E402
+from objectmorpher_research.training.shadows.grounds import (  # noqa: E402
+    WAYS,
+    Grounds,
+    any_texture,
+    photographs,
+)
 
 COUNT = 6
 
@@ -90,6 +105,80 @@ def test_what_should_be_found_is_on_the_ground_that_is_seen(drawn):
             assert shade > samples.DARK * samples.LARGE * 0.5 * sample.planes[3].sum()
         if not sample.dark.any():
             assert sample.label == 0
+
+
+def test_textures_are_of_all_kinds_and_in_range():
+    rng = np.random.default_rng(2)
+    assert sum(share for _, share in WAYS) == pytest.approx(1)
+    found = [any_texture(rng, photographs()) for _ in range(60)]
+    for texture in found:
+        assert np.isfinite(texture).all()
+        assert texture.min() >= 0
+        assert texture.max() <= 1
+    busy = [float(np.log(texture + 0.02).std()) for texture in found]
+    assert min(busy) < 0.15  # plain
+    assert max(busy) > 0.5
+
+
+def test_grounds_are_parts_of_a_folders_pictures(tmp_path):
+    for name, colour in (("red.png", (250, 5, 5)), ("in/blue.jpg", (5, 5, 250))):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        Image.new("RGB", (90, 60), colour).save(tmp_path / name)
+    shown = photographs(tmp_path)
+    assert [image.shape for image in shown] == [(60, 90, 3)] * 2
+    assert sorted(int(image.mean((0, 1)).argmax()) for image in shown) == [0, 2]
+    assert Grounds(np.random.default_rng(0), 2, tmp_path).photographs is shown
+    (tmp_path / "none").mkdir()
+    with pytest.raises(ValueError, match="no pictures"):
+        photographs(tmp_path / "none")
+
+
+def test_some_samples_are_seen_from_nearer_and_none_from_farther_away(drawn):
+    longer = []
+    for sample in drawn:
+        is_thing = sample.planes[3] > 0.5
+        rows, columns = np.flatnonzero(is_thing.any(1)), np.flatnonzero(is_thing.any(0))
+        longer.append((max(np.ptp(rows), np.ptp(columns)) + 1) / THING)
+    assert min(longer) > 0.9
+    assert any(one < 1.1 for one in longer)
+    assert any(1.2 < one < samples.NEAREST + 0.1 for one in longer)
+
+
+def test_from_nearer_the_thing_stays_in_the_middle():
+    cover = np.zeros((3 * CELLS, 3 * CELLS), np.float32)
+    cover[CELLS : 2 * CELLS, CELLS + 20 : 2 * CELLS - 20] = 1
+    near = shrunk(enlarged((cover,), 1.5)[0]) > 0.5
+    rows, columns = np.flatnonzero(near.any(1)), np.flatnonzero(near.any(0))
+    assert abs(len(rows) - 1.5 * THING) <= 1
+    assert abs(len(columns) - 1.5 * (CELLS - 40) / 2) <= 1
+    assert abs(rows.mean() - (SIDE - 1) / 2) <= 0.5
+    assert abs(columns.mean() - (SIDE - 1) / 2) <= 0.5
+
+
+def test_training_goes_on_from_exported_weights(drawn, tmp_path):
+    """Weights are kept in bytes: what is seen with them again is a little off."""
+    ring = train_shadow.SampleRing(len(drawn))
+    ring.add(*train_shadow.arrays_of(drawn))
+    plan, rng = train_shadow.ShadowPlan(steps=60, size=4), np.random.default_rng(3)
+    state = train_shadow.ShadowState(tmp_path / "first.pt", plan)
+    for _ in range(12):
+        state.learn(*ring.drawn(rng, 4))
+    first, file = state.trained(), tmp_path / "shadow.onnx"
+    train_shadow.export(first, file)
+    start = weights_of(file, ShadowNet())
+    state = train_shadow.ShadowState(tmp_path / "shadow.pt", plan, start)
+    net = state.trained()
+    planes = torch.from_numpy(np.stack([s.planes for s in drawn]))
+    with torch.no_grad():
+        for own, kept in zip(first(planes), net(planes), strict=True):
+            assert float((own - kept).abs().mean()) < 0.05 * float(own.std())
+    state.learn(*ring.drawn(rng, 4))
+    state.learn(*ring.drawn(rng, 4))
+    for name, weight in state.trained().named_parameters():
+        assert not torch.equal(state.mean[name], start[name])
+        assert torch.allclose(2 * weight, state.mean[name] + start[name], atol=1e-6), name
+    with pytest.raises(ValueError, match="another network"):
+        weights_of(file, RodNet())
 
 
 def test_it_learns_and_runs_without_torch(drawn, tmp_path):

@@ -8,12 +8,14 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, Mask
+from objectmorpher_core.base.masks import box_of
 from objectmorpher_core.compose.shadow.old_shadow import BLACK
 from objectmorpher_core.compose.shadow.shadow import GAMMA
 from objectmorpher_core.compose.shadow.shadow_fit import FREE, LUMA
-from objectmorpher_core.compose.shadow.shadow_look import SIDE, THING, planes_of
+from objectmorpher_core.compose.shadow.shadow_look import CELLS, enlarged, seen_planes, shrunk
 
-from .grounds import SCENIC, Grounds, any_colour, photographs
+from .drawn import any_colour
+from .grounds import Grounds, recoloured
 from .scenes import FINE, GROUND, NEIGHBOUR, SKY, THING_SEEN, WALL, SceneGeometry
 
 SHADED = 0.58  # of the scenes show the thing's own shadow
@@ -23,6 +25,7 @@ OTHER_GROUND = 0.35
 DARK = 0.12  # of the light, from which a cell counts as shaded
 LARGE, NONE = 0.12, 0.01  # x the thing's area: a shadow that one sees, and hardly any
 COLOURS = 16  # of a thing's parts
+NEARER, NEAREST = 0.6, 1.8  # of the samples, how many are seen from nearer; x as large at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,7 @@ def make_sample(
         shares[0] * field[first] + shares[1] * field[1 - first] + shares[2] * field[2]
         for field in (scene.light, scene.facing)
     )
-    light = cv2.GaussianBlur(light, (0, 0), rng.uniform(0.5, 0.9))
+    light = cv2.GaussianBlur(light, (0, 0), rng.uniform(0.5, 1.8))
     has_shadow = rng.random() < SHADED
     dark = np.clip(1 - light[..., 0] / np.maximum(light[..., 1], 1e-4), 0, 1)
     falls = light[..., 0 if has_shadow else 1]
@@ -58,53 +61,58 @@ def make_sample(
 
 
 def _sample(rng: np.random.Generator, scene: SceneGeometry, shown: F32, dark: F32) -> ShadowSample:
+    """What the network sees of a picture, at the scale at which it always looks or from nearer."""
     cover, others, ground = (
-        _small((scene.what == kind).astype(np.float32)) for kind in (THING_SEEN, NEIGHBOUR, GROUND)
+        (scene.what == kind).astype(np.float32) for kind in (THING_SEEN, NEIGHBOUR, GROUND)
     )
     hidden = np.maximum(cover, others) if rng.random() < 0.25 else cover
-    free = _frame(rng) & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)
+    inside = _frame(rng, cover > 0)
+    free = (inside & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)).astype(np.float32)
     logarithm = np.log(shown + np.float32(BLACK))
     colour = logarithm[..., [0, 2]] - logarithm[..., 1:2]
-    planes = planes_of(logarithm @ LUMA, colour, cover, free)
-    is_ground = ground > 0.5
-    weight = free & is_ground if dark.any() else free
-    dark = dark * is_ground
-    area = float(((dark > DARK) & free).sum()) / max(float(cover.sum()), 1.0)
+    closer = rng.uniform(1, NEAREST) if rng.random() < NEARER else 1.0
+    fields = logarithm @ LUMA, colour, cover, free, dark * ground, ground
+    if closer > 1:
+        fields = enlarged(fields, closer)
+    planes = seen_planes(fields[:4])
+    dark, ground = shrunk(fields[4]), shrunk(fields[5])
+    is_free, is_ground = planes[4] > 0, ground > 0.5
+    weight = is_free & is_ground if dark.any() else is_free
+    dark = np.where(is_ground, dark / np.maximum(ground, 0.5), 0)
+    area = float(((dark > DARK) & is_free).sum()) / max(float(planes[3].sum()), 1.0)
     label = 1.0 if area > LARGE else 0.0 if area < NONE else np.nan
     return ShadowSample(planes, dark.astype(np.float32), weight.astype(np.float32), label)
 
 
-def _small(picture: F32) -> F32:
-    return np.asarray(cv2.resize(picture, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.float32)
-
-
-def _frame(rng: np.random.Generator) -> Mask:
-    """(SIDE, SIDE) what the photo shows: half of its edges are near the thing."""
-    inside = np.zeros((SIDE, SIDE), bool)
-    margin = (SIDE - THING) // 2
+def _frame(rng: np.random.Generator, thing: Mask) -> Mask:
+    """(FINE, FINE) what is looked at: as far as the photo goes, half of whose edges are near."""
+    inside = np.zeros((FINE, FINE), bool)
+    margin = (FINE - CELLS) // 2
     reach = np.minimum(rng.exponential(0.9, 4) + 0.03, 1) * margin
     reach = np.where(rng.random(4) < 0.5, reach, margin).astype(int)
-    top, left, bottom, right = reach
-    inside[margin - top : SIDE - margin + bottom, margin - left : SIDE - margin + right] = True
+    x0, y0, x1, y1 = box_of(thing)
+    top, left = np.maximum(margin - reach[:2], np.maximum([y0 - CELLS, x0 - CELLS], 0))
+    bottom, right = np.minimum(FINE - margin + reach[2:], [y1 + CELLS, x1 + CELLS])
+    inside[top:bottom, left:right] = True
     return inside
 
 
 def _other_shade(rng: np.random.Generator, dark: F32, other: SceneGeometry) -> F32:
-    """(SIDE, SIDE) the light that something else leaves: shadows of other scenes, or its own,
+    """(FINE, FINE) the light that something else leaves: shadows of other scenes, or its own,
     turned, where no lamp would throw it."""
-    share, middle = rng.random(), (SIDE / 2, SIDE / 2)
+    share, middle = rng.random(), (FINE / 2, FINE / 2)
     if share > 0.65:
         return np.ones_like(dark)
     if share < 0.5:
         ambient = rng.uniform(0.2, 0.7)
         light = (1 - ambient) * other.light[rng.integers(2)] + ambient * other.light[2]
         leaves = np.clip(light[..., 0] / np.maximum(light[..., 1], 1e-3), 0.05, 1)
-        turn, size, away = rng.uniform(0, 360), rng.uniform(0.6, 1.6), 14
+        turn, size, away = rng.uniform(0, 360), rng.uniform(0.6, 1.6), 28
     else:
-        leaves, turn, size, away = 1 - dark, rng.uniform(40, 320), 1.0, 10
+        leaves, turn, size, away = 1 - dark, rng.uniform(40, 320), 1.0, 20
     matrix = cv2.getRotationMatrix2D(middle, turn, size)
     matrix[:, 2] += rng.normal(0, away, 2)
-    return np.asarray(cv2.warpAffine(leaves, matrix, (SIDE, SIDE), borderValue=1.0), np.float32)
+    return np.asarray(cv2.warpAffine(leaves, matrix, (FINE, FINE), borderValue=1.0), np.float32)
 
 
 def _uneven(rng: np.random.Generator) -> F64:
@@ -127,9 +135,9 @@ def _surfaces(
     """(FINE, FINE, 3) linear light of ground, wall, neighbours and the thing."""
     what = scene.what[..., None]
     if not has_shadow and rng.random() < PASTED:
-        picture = _scenery(rng)
+        picture = _scenery(rng, grounds.photographs)
     else:
-        light = cv2.resize(falls, (FINE, FINE), interpolation=cv2.INTER_LINEAR)[..., None]
+        light = falls[..., None]
         picture = _ground(rng, grounds, scene.place) * light
         if (what == WALL).any():
             picture = np.where(what == WALL, grounds.at(scene.place) * light, picture)
@@ -141,16 +149,16 @@ def _surfaces(
     return np.asarray(picture, np.float32)
 
 
-def _scenery(rng: np.random.Generator) -> F32:
-    """A part of a photograph, whole scenes most of the time."""
-    number = rng.integers(SCENIC if rng.random() < 0.7 else len(photographs()))
-    whole = photographs()[number]
+def _scenery(rng: np.random.Generator, shown: tuple[F32, ...]) -> F32:
+    """(FINE, FINE, 3) a part of a photograph."""
+    whole = shown[rng.integers(len(shown))]
     height, width = whole.shape[:2]
-    side = int(rng.uniform(0.35, 1) * min(height, width))
+    side = int(rng.uniform(0.25, 1) * min(height, width))
     y, x = rng.integers(height - side + 1), rng.integers(width - side + 1)
-    part = whole[y : y + side, x : x + side]
+    part: np.ndarray = whole[y : y + side, x : x + side]
     part = cv2.resize(part, (FINE, FINE), interpolation=cv2.INTER_AREA)
     part = part[:, ::-1] if rng.random() < 0.5 else part
+    part = recoloured(rng, part) if rng.random() < 0.5 else part
     return np.asarray(part * rng.uniform(0.7, 1.2), np.float32)
 
 
@@ -189,8 +197,8 @@ def _skin(rng: np.random.Generator, grounds: Grounds, places: F32) -> F32:
 
 
 def _photographed(rng: np.random.Generator, linear: F64) -> F32:
-    """(SIDE, SIDE, 3) linear light as a camera has it: exposed, tinted, with noise, in range."""
+    """(FINE, FINE, 3) linear light as a camera has it: exposed, tinted, with noise, in range."""
     gain = np.exp(rng.normal(0, 0.25)) * np.exp(rng.normal(0, 0.08, 3))
     encoded = np.clip(linear * gain, 0, 1) ** (1 / GAMMA)
     encoded = encoded + rng.normal(0, rng.uniform(0, 0.02), encoded.shape)
-    return _small((np.clip(encoded, 0, 1) ** GAMMA).astype(np.float32))
+    return (np.clip(encoded, 0, 1) ** GAMMA).astype(np.float32)

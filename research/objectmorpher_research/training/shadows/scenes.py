@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
+import cv2
 import numba as nb
 import numpy as np
 
@@ -26,7 +27,7 @@ from .solids import (
 FINE = 2 * SIDE  # px across, of what is seen
 GROUND, WALL, NEIGHBOUR, THING_SEEN, SKY = range(5)
 LAMPS = 2  # of a scene; a sample mixes them
-SHARP, RAYS, SKY_RAYS = 0.01, (4, 9), 10  # rays to a lamp that is nearly a point, to others, up
+SHARP, RAYS, SKY_RAYS = 0.01, (2, 5), 10  # rays to a lamp that is nearly a point, to others, up
 FARTHEST = 60.0  # of ground that is drawn
 THROWN = 10.0  # from the origin, as far as anything throws a shadow
 FIRST_LOOK = 80  # px across, of the look that finds the thing's box
@@ -49,7 +50,7 @@ class SceneGeometry:
     what: np.ndarray  # (FINE, FINE) u8: GROUND to SKY
     place: F32  # (FINE, FINE, 2) on the ground or the wall; of a part: which, and its height
     facing: F32  # (LAMPS + 1, FINE, FINE) how much parts face the lamps, and the sky
-    light: F32  # (LAMPS + 1, SIDE, SIDE, 2) share that reaches ground or wall, with the thing
+    light: F32  # (LAMPS + 1, FINE, FINE, 2) share that reaches ground or wall, with the thing
     # and without
 
 
@@ -226,7 +227,7 @@ def _geometry(
     what, place, normals = _seen(camera, camera.ways(*window, FINE), parts, shapes, wall)
     if (what == GROUND).mean() < LEAST_GROUND:
         return None
-    ways = camera.ways(*window, SIDE)
+    ways = {side: camera.ways(*window, side) for side in (FINE, SIDE)}
     lights, lamps = [], []
     for _ in range(LAMPS):
         turn, rise = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(15, 80))
@@ -234,8 +235,9 @@ def _geometry(
         lamps.append(np.array([np.cos(turn) * flat, np.sin(rise), np.sin(turn) * flat]))
         spread = float(rng.choice([0.005, 0.02, 0.05, 0.1, 0.2]))
         beams = np.repeat(lamps[-1][None], RAYS[spread >= SHARP], 0)
-        lights.append(_lit(rng, camera, ways, parts, shapes, wall, beams, spread))
-    lights.append(_lit(rng, camera, ways, parts, shapes, wall, _sky(rng), 0.12))
+        lights.append(_lit(rng, camera, ways[FINE], parts, shapes, wall, beams, spread))
+    sky = _lit(rng, camera, ways[SIDE], parts, shapes, wall, _sky(rng), 0.12)  # it is soft
+    lights.append(cv2.resize(sky, (FINE, FINE), interpolation=cv2.INTER_LINEAR))
     facing = [np.clip(normals @ lamp, 0, 1) for lamp in lamps] + [0.6 + 0.4 * normals[:, 1]]
     fine = (FINE, FINE)
     return SceneGeometry(
@@ -251,7 +253,8 @@ def _lit(
     out = np.zeros((len(ways), 2))
     seed = int(rng.integers(1 << 30))
     _shine(ways, camera.eye, parts, shapes, wall, beams, spread, seed, out)
-    return out.reshape(SIDE, SIDE, 2).astype(np.float32)
+    side = round(len(ways) ** 0.5)
+    return out.reshape(side, side, 2).astype(np.float32)
 
 
 def _sky(rng: np.random.Generator) -> F64:
