@@ -40,7 +40,6 @@ from .document.model import (
 )
 from .document.settings import Hint
 from .lift.beyond_frame import cut_out_beyond
-from .lift.large import lift_subject
 from .lift.loose_hair import with_hair_along, with_loose_hair
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
 from .lift.registration.other_photo import OtherPhoto, with_photo
@@ -126,7 +125,7 @@ def lift_mask(
     if use_matte is not None:
         use_matte(whole)
     subject = lift.LiftSubject(pixels, camera, is_selected(mask), matte)
-    lifted = lift_subject(lifter, subject, settings, part(progress, 0.3, 1.0), seed)
+    lifted = lift.lift_subject(lifter, subject, settings, part(progress, 0.3, 1.0), seed)
     return whole, with_hair_along(lifted, matte, whole, camera, seed)
 
 

@@ -1,4 +1,4 @@
-"""What is in a mask: the box around it, its largest piece, and what is near it."""
+"""What is in a mask: its box, its largest piece, what is near it; and large pictures, reduced."""
 
 from __future__ import annotations
 
@@ -42,3 +42,55 @@ def disc(radius: int) -> U8:
 def dilated(mask: Mask, radius: int) -> Mask:
     """`mask` (H, W) and what is `radius` px from it at most."""
     return cv2.dilate(mask.astype(np.uint8), disc(radius)) > 0
+
+
+# Pictures of a hundred megapixels, and the smaller ones in which something of them is decided.
+#
+# What is decided for a whole object, as its shape, is the same in a picture of a few megapixels;
+# there it takes seconds and hardly any memory. Up to `LARGE` px nothing is reduced: what an
+# ordinary camera takes is looked at as it is.
+
+LARGE = 30_000_000  # px
+ENOUGH = 8_000_000  # px, of what a larger picture is reduced to, at most
+STRIP = 128  # rows of the smaller picture that are made at a time
+
+Pads = tuple[tuple[int, int], tuple[int, int]]  # px above and below, left and right
+
+
+def reduction(shape: tuple[int, ...]) -> int:
+    """By how much the sides of a picture (H, W, ...) are divided; 1 for what is not large."""
+    size, times = shape[0] * shape[1], 1
+    if size > LARGE:
+        while size > ENOUGH * times**2:
+            times *= 2
+    return times
+
+
+def reduced(image: np.ndarray, times: int, pads: Pads = ((0, 0), (0, 0))) -> np.ndarray:
+    """The means of `times` x `times` px of an image (H, W, ...), of its own type.
+
+    `pads` are added before, copies of the image's rim, and so is what the last means lack.
+    """
+    (above, below), (left, right) = pads
+    height, width = above + image.shape[0] + below, left + image.shape[1] + right
+    size = -(-height // times), -(-width // times)
+    small = np.empty((*size, *image.shape[2:]), image.dtype)
+    for first in range(0, size[0], STRIP):
+        count = min(STRIP, size[0] - first)
+        start = times * first - above  # row of the image
+        top, bottom = max(start, 0), min(start + times * count, image.shape[0])
+        top, bottom = min(top, image.shape[0] - 1), max(bottom, 1)  # all of it may be a pad
+        part = cv2.copyMakeBorder(
+            image[top:bottom], max(top - start, 0), 0, left, 0, cv2.BORDER_REPLICATE
+        )[: times * count]
+        lacks = times * count - len(part), times * size[1] - part.shape[1]
+        if any(lacks):
+            part = cv2.copyMakeBorder(part, 0, lacks[0], 0, lacks[1], cv2.BORDER_REPLICATE)
+        where = (size[1], count)
+        cv2.resize(part, where, dst=small[first : first + count], interpolation=cv2.INTER_AREA)
+    return small
+
+
+def reduced_mask(mask: Mask, times: int) -> Mask:
+    """A mask (H, W): what at least half of `times` x `times` px are in."""
+    return reduced(mask.view(np.uint8) * np.uint8(255), times) >= 128

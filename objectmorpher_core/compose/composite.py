@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ..base.camera import Camera
-from ..base.large import LARGE
+from ..base.masks import LARGE
 from ..base.progress import Progress, silent
 from ..deform.puppet import Puppet, puppet_of
 from ..document.bounds import MULTIPLY, NORMAL, SCREEN

@@ -20,8 +20,7 @@ from scipy.spatial import KDTree
 
 from ..base.arrays import F32, U8, Mask, Pixels, crop, unit_pixels
 from ..base.camera import Camera
-from ..base.large import LARGE, reduction
-from ..base.masks import box_of, disc
+from ..base.masks import LARGE, box_of, disc, reduction
 from ..base.rotations import quats_along
 from ..base.threads import in_threads
 from ..document.model import HAIR, Gaussians, LiftedObject, Matte, PhotoTexture

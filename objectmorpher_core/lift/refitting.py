@@ -38,9 +38,8 @@ from ..document.pose import Base, Pose
 from ..document.sides import Sides
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width
-from . import LiftError, LiftSubject, load
+from . import LiftError, LiftSubject, lift_subject, load
 from .beyond_frame import cut_out_beyond
-from .large import lift_subject
 from .loose_hair import with_hair_along, with_loose_hair
 from .registration.imported import ImportTarget, rematted
 from .relief.spreading import BRIM

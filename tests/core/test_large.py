@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base import large
-from objectmorpher_core.base.large import ENOUGH, reduced, reduced_mask, reduction
+from objectmorpher_core.base.masks import ENOUGH, reduced, reduced_mask, reduction
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.compose.plate import plate as plates
 from objectmorpher_core.compose.plate.completion import shrunk

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
-from ...base.large import LARGE
+from ...base.masks import LARGE
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint

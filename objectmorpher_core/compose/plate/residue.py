@@ -20,8 +20,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
-from ...base.large import LARGE
-from ...base.masks import box_of, disc
+from ...base.masks import LARGE, box_of, disc
 from ...base.threads import core_count
 from ...document.model import Document, EditObject, Matte, Placement, Plate
 from ...document.placement import is_in_place

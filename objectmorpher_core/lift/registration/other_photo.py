@@ -30,8 +30,7 @@ from ...raster.reference import Picture3D
 from ...raster.texture import build_levels
 from ...segment.mask_edit import is_selected
 from ...segment.matting.matte import cut_out
-from .. import Lifter, LiftError, LiftSubject
-from ..large import lift_subject
+from .. import Lifter, LiftError, LiftSubject, lift_subject
 from .placement import Hints, Registrar
 from .search import angles
 from .sketch import Matches, alike

@@ -17,8 +17,7 @@ from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import LiftedObject, LiftSettings, Matte, Placement
 from objectmorpher_core.document.settings import DeformSettings
-from objectmorpher_core.lift import LiftSubject
-from objectmorpher_core.lift.large import lift_subject
+from objectmorpher_core.lift import LiftSubject, lift_subject
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.pipeline import lift_mask
