@@ -8,7 +8,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from objectmorpher_core.base import large
+from objectmorpher_core.base import masks
 from objectmorpher_core.base.masks import ENOUGH, reduced, reduced_mask, reduction
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.compose.plate import plate as plates
@@ -21,7 +21,7 @@ from tests.tree import over
 F32_ROUNDING = 1e-6
 
 
-def _padded(image: np.ndarray, times: int, pads: large.Pads) -> np.ndarray:
+def _padded(image: np.ndarray, times: int, pads: masks.Pads) -> np.ndarray:
     (above, below), (left, right) = pads
     height, width = above + len(image) + below, left + image.shape[1] + right
     more = (above, below + -height % times), (left, right + -width % times)
@@ -30,7 +30,7 @@ def _padded(image: np.ndarray, times: int, pads: large.Pads) -> np.ndarray:
 
 @over("n", range(60))
 def test_a_reduced_picture_is_the_means_of_its_blocks(n, monkeypatch):
-    monkeypatch.setattr(large, "STRIP", (3, 128)[n % 2])
+    monkeypatch.setattr(masks, "STRIP", (3, 128)[n % 2])
     chance = np.random.default_rng(n)
     height, width = (int(side) for side in chance.integers(1, 40, 2))
     times, channels = 2 ** (n % 3), ((), (3,))[n // 3 % 2]
@@ -56,7 +56,7 @@ SIZES = [(10, 10), (4000, 6000), (6000, 5000), (6000, 5001), (10_000, 10_000), (
 @over("shape", SIZES)
 def test_only_what_is_larger_than_ordinary_photos_is_reduced(shape):
     times, size = reduction(shape), shape[0] * shape[1]
-    assert (times == 1) == (size <= large.LARGE)
+    assert (times == 1) == (size <= masks.LARGE)
     assert times == 1 or ENOUGH / 4 < size / times**2 <= ENOUGH
 
 

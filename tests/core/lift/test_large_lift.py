@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from objectmorpher_core.base import large
+from objectmorpher_core.base import masks
 from objectmorpher_core.base.arrays import crop
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.light.lighting import object_texture
@@ -51,13 +51,13 @@ def reduced() -> LiftedObject:
     subject, _ = _subject()
     with pytest.MonkeyPatch.context() as patch:
         _take_for_large(patch)
-        assert large.reduction(subject.matte.alpha.shape) == 2
+        assert masks.reduction(subject.matte.alpha.shape) == 2
         return lift_subject(ReliefLifter(), subject, SETTINGS, silent)
 
 
 def _take_for_large(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(large, "LARGE", 50_000)
-    patch.setattr(large, "ENOUGH", 200_000)
+    patch.setattr(masks, "LARGE", 50_000)
+    patch.setattr(masks, "ENOUGH", 200_000)
 
 
 def _drawn(lifted: LiftedObject, turn: tuple[float, float, float]) -> Picture3D:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from skimage import data
 
-from objectmorpher_core.base import large
+from objectmorpher_core.base import masks
 from objectmorpher_core.base.arrays import F32, Mask, Pixels, crop
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate.plate import hole_margin, plate_cover
@@ -149,8 +149,8 @@ def test_of_a_large_photo_no_more_is_taken_for_hair_than_of_the_smaller_one(monk
     pixels = _mixed(_ground("blurred", np.random.default_rng(0)), (cover, 20), (fur, 120))
     matte = Matte(0, 0, fur, np.repeat(fur[..., None], 3, 2))
     hairy = with_loose_hair(pixels, matte)
-    monkeypatch.setattr(large, "LARGE", 1000)
-    monkeypatch.setattr(large, "ENOUGH", WIDTH * HEIGHT // 100**2)
+    monkeypatch.setattr(masks, "LARGE", 1000)
+    monkeypatch.setattr(masks, "ENOUGH", WIDTH * HEIGHT // 100**2)
     assert with_loose_hair(pixels, matte) is matte is not hairy
 
 
