@@ -1,0 +1,47 @@
+"""Paint is one picture, whichever tiles hold it: compared with one array of it all."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from objectmorpher_core.document.paint import SIDE, Paint
+
+CORNER = -SIDE  # px, of the array that stands for it all
+WHOLE = 3 * SIDE
+F32 = 1e-6
+PLACES = st.integers(CORNER, CORNER + WHOLE - 60)
+SIZES = st.integers(1, 60)
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    st.lists(st.tuples(PLACES, PLACES, SIZES, SIZES), min_size=1, max_size=4), st.integers(0, 99)
+)
+def test_what_is_laid_on_is_there_and_nothing_else(strokes, seed):
+    rng = np.random.default_rng(seed)
+    paint = Paint((), np.zeros((0, 4), np.uint8))
+    whole = np.zeros((WHOLE, WHOLE, 4), np.uint8)
+    for x, y, width, height in [*strokes, (-20, SIDE - 20, 45, 40)]:  # over a corner of tiles
+        rgba = rng.integers(0, 256, (height, width, 4)).astype(np.uint8)
+        rgba[..., 3] |= 1
+        paint = paint.with_pixels((x, y, x + width, y + height), rgba)
+        whole[y - CORNER : y - CORNER + height, x - CORNER : x - CORNER + width] = rgba
+    everything = (CORNER, CORNER, CORNER + WHOLE, CORNER + WHOLE)
+    np.testing.assert_array_equal(paint.crop(everything), whole)
+    assert all(tile.left % SIDE == tile.top % SIDE == 0 for tile in paint.tiles)
+    assert all(tile.rgba[..., 3].any() for tile in paint.tiles), "a tile without paint is none"
+    assert len({(tile.left, tile.top) for tile in paint.tiles}) == len(paint.tiles)
+    left, top = strokes[0][0] - 3, strokes[0][1] - 5
+    colours = rng.random((70, 66, 3)).astype(np.float32)
+    part = paint.crop((left, top, left + 66, top + 70)) / 255
+    mixed = colours + part[..., 3:] * (part[..., :3] - colours)
+    np.testing.assert_allclose(paint.over(colours, left, top), mixed, atol=F32)
+
+
+def test_what_is_wiped_off_leaves_no_tile():
+    box = (SIDE - 4, 2 * SIDE - 3, SIDE + 5, 2 * SIDE + 6)
+    paint = Paint((), np.zeros((0, 4), np.uint8)).with_pixels(box, np.full((9, 9, 4), 9, np.uint8))
+    assert len(paint.tiles) == 4
+    assert not paint.with_pixels(box, np.zeros((9, 9, 4), np.uint8)).tiles
