@@ -21,7 +21,8 @@ CAMERA = Camera(90.0, 50.0, 40.0, *THERE)
 def _document(origin: Origin | None, box: tuple[int, int, int, int] = (10, 10, 20, 20)) -> Document:
     """With one object, whose matte has this box."""
     x0, y0, x1, y1 = box
-    matte = Matte(x0, y0, np.ones((y1 - y0, x1 - x0)), np.ones((y1 - y0, x1 - x0, 3)))
+    shape = y1 - y0, x1 - x0
+    matte = Matte(x0, y0, np.ones(shape, np.float32), np.ones((*shape, 3), np.float32))
     ball = shapes.ball(20)
     lifted = replace(shapes.lifted_cloud(ball, ball[:8]), origin=origin)
     item = EditObject("Ball", mask=np.zeros(HERE[::-1], bool), matte=matte, lifted=lifted)

@@ -33,11 +33,12 @@ def test_what_is_laid_on_is_there_and_nothing_else(strokes, seed):
     assert all(tile.left % SIDE == tile.top % SIDE == 0 for tile in paint.tiles)
     assert all(tile.rgba[..., 3].any() for tile in paint.tiles), "a tile without paint is none"
     assert len({(tile.left, tile.top) for tile in paint.tiles}) == len(paint.tiles)
-    left, top = strokes[0][0] - 3, strokes[0][1] - 5
-    colours = rng.random((70, 66, 3)).astype(np.float32)
-    part = paint.crop((left, top, left + 66, top + 70)) / 255
-    mixed = colours + part[..., 3:] * (part[..., :3] - colours)
-    np.testing.assert_allclose(paint.over(colours, left, top), mixed, atol=F32)
+    around = strokes[0][0] - 3, strokes[0][1] - 5, (66, 70)
+    for left, top, size in (around, (-15, SIDE - 15, (30, 20))):  # the second is full of paint
+        colours = rng.random((*size, 3)).astype(np.float32)
+        part = paint.crop((left, top, left + size[1], top + size[0])) / 255
+        mixed = colours + part[..., 3:] * (part[..., :3] - colours)
+        np.testing.assert_allclose(paint.over(colours, left, top), mixed, atol=F32)
 
 
 def test_what_is_wiped_off_leaves_no_tile():
