@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -274,3 +276,25 @@ def test_a_coverage_that_is_hard_everywhere_is_just_a_mask(document):
     assert item.coverage is None
     np.testing.assert_array_equal(item.mask, mask)
     assert item.selection is item.mask
+
+
+@pytest.mark.parametrize(
+    "depth", [np.ones(4), np.ones((2, 0)), np.array([[1.0, np.nan]]), np.ones((2, 2, 1))]
+)
+def test_a_depth_map_that_is_none_is_refused(document, depth):
+    with pytest.raises(EditError, match="number for each"):
+        edits.set_depth(document, depth)
+    assert edits.set_depth(document, np.ones((2, 3))).depth.shape == (2, 3)
+
+
+def test_thawing_what_is_not_frozen_changes_nothing(document):
+    assert edits.thaw(document, 0, REGIONS[0]) is document
+    flat = document.with_object(0, replace(document.objects[0], lifted=None))
+    assert edits.thaw(flat, 0, REGIONS[0]) is flat
+
+
+def test_a_stiffness_is_a_positive_finite_number_for_each_control_point():
+    Rig(stiffness=np.array([1e-300, 1e300])).check(2)
+    for wrong in ([1.0, np.inf], [0.0, 1.0], [1.0, np.nan], [1.0, -1.0], [1.0]):
+        with pytest.raises(ValueError, match="stiffness"):
+            Rig(stiffness=np.array(wrong)).check(2)

@@ -126,3 +126,17 @@ def test_a_singular_matrix_is_pushed_off_singular():
     found = response.solve(forces)
     assert np.isfinite(found).all()
     assert np.abs(_laplacian() @ found - forces).max() < 1e-4
+
+
+@KINDS
+def test_what_hangs_on_nothing_still_resists_every_force(kind):
+    """Rounding leaves such a matrix singular: the smallest push makes it positive, not negative."""
+    count = 30
+    links = np.full(count - 1, -1.0)
+    path = np.diag(links, 1) + np.diag(links, -1)
+    response = kind(csr_array(path - np.diag(path.sum(1))))
+    forces = np.ones((count, 3))
+    moves = response.solve(forces)
+    assert np.isfinite(moves).all()
+    assert (moves > 0).all()
+    assert (response.columns(np.arange(count)).diagonal() > 0).all()

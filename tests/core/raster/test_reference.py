@@ -180,3 +180,28 @@ def test_a_side_behind_a_rim_is_seen_however_little_of_the_photo_it_shows(own):
     composite.add(rim)
     composite.add(side)
     assert np.abs(composite.alpha - (1 - own)).max() < 1e-6
+
+
+@pytest.mark.parametrize("size", [(9, 12), (12, 9), (7, 13)])
+def test_an_odd_last_row_or_column_counts_twice(size):
+    height, width = size
+    texels = RNG.random((height, width, 4)).astype(np.float32)
+    coarse = build_levels(texels[..., :3], texels[..., 3], 0, 0).levels[1]
+    more = np.pad(texels, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    blocks = more.reshape(more.shape[0] // 2, 2, more.shape[1] // 2, 2, 4)
+    np.testing.assert_allclose(coarse, blocks.mean((1, 3)), atol=F32)
+
+
+@pytest.mark.parametrize("splatting", SPLATTINGS)
+def test_a_gaussians_box_ends_where_its_alpha_does(splatting):
+    """Alpha reaches the least that counts on each side of the box, and is less beyond."""
+    splats, _ = shapes.random_splats(0, splatting)
+    kind = SPLATTINGS[splatting]
+    p = reference.project(splats, shapes.camera(), shapes.camera())
+    seen = p.weight * (1 - kind.tail) > kind.least * 1.01 + 1e-9
+    assert seen.sum() > 20
+    inverse = np.linalg.inv(p.conic[:, [0, 1, 1, 2]].reshape(-1, 2, 2))
+    for axis in range(2):  # farthest along it of all places with the same alpha
+        q = p.extent[:, axis] ** 2 / inverse[:, axis, axis]
+        alpha = p.weight * (np.exp(-q / 2) - kind.tail)
+        np.testing.assert_allclose(alpha[seen], kind.least, atol=F32)

@@ -420,3 +420,21 @@ def test_no_line_is_seen_through_beside_a_rim_that_has_turned():
             line = cv2.morphologyEx(alpha, cv2.MORPH_CLOSE, around) - alpha
             assert line.max() < 0.2, (name, placement.turn)  # half of it and more without closing
             assert line.sum() < 8, (name, placement.turn)  # px; a line all along has about 50
+
+
+@pytest.mark.parametrize("move", [(0.0, 0.0), (45.0, -20.0), (-90.0, 30.0), (30.0, 70.0)])
+def test_the_box_is_what_all_gaussians_touch(move):
+    """As the specification has them: of what is beside the picture, the part that is in it."""
+    ball = shapes.ball(200)
+    lifted = shapes.lifted_cloud(0.6 * ball, ball[:20])
+    camera = shapes.camera()
+    rest = RestSplats(lifted, camera)
+    splats = PosedSplats(rest, None, Placement(move=move).matrix(lifted, camera))
+    p = reference.project(splats, camera, camera)
+    there = p.weight > 0
+    low = np.floor((p.centre - p.extent)[there].min(0)).clip(0, (camera.width, camera.height))
+    high = np.ceil((p.centre + p.extent)[there].max(0)).clip(0, (camera.width, camera.height))
+    box = tiles.prepare(splats, camera, camera).box()
+    assert box == (*low.astype(int), *high.astype(int))
+    away = PosedSplats(rest, None, Placement(move=(1000.0, 0.0)).matrix(lifted, camera))
+    assert tiles.prepare(away, camera, camera).box() is None
