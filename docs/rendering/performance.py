@@ -47,11 +47,19 @@ all frames, which is nearer to what the program itself needs where the machine h
 PROFILE = """
 ### Where an edit's time goes
 
-Of the first edit of *enlarged*, a process of its own, @@ s of the processors in @@ s on the clock:
+Of the first edit of *enlarged*, a process of its own, 7.0 s of the processors in 4.3 s on the clock:
 
 | What | Processor s |
 |---|---:|
-@@
+| imports | 1.1 |
+| DINOv2, opened and run | 1.7 |
+| U²-Net-p, its two looks | 0.7 |
+| lifting | 1.7 |
+| filling in behind it, selecting, drawing, writing, the rest | 1.8 |
+
+A living thing takes longer: the samples' astronaut and cat, as large, take 5.8 s (10.1 of the
+processors), and 3.3 s again. They have sides to be invented, and are compared with solids, of which
+the cup is one at once.
 
 The photo is encoded while the rest of the program is imported, and the background is filled in
 while the object is lifted. The last second has one core without work: each round of the search for
@@ -60,8 +68,7 @@ they said of the last photos is kept. Of DINOv2's run four fifths are matrix pro
 softmax. The first `edit` of an installation compiles kernels besides, for about a minute: three
 quarters of that is numba's own work in Python, a quarter LLVM's.
 
-*made* is noise all over, in which no patch is like another and everything stands out; it takes a
-second longer than a photograph.
+*made* is noise all over, in which no patch is like another and everything stands out.
 """
 
 FRAMES = """
