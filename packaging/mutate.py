@@ -46,7 +46,10 @@ def sites(path: Path) -> Iterator[tuple[Mutant, ast.Module]]:
     for function, node in _nodes(tree, ""):
         before = ast.unparse(node)
         undo = _change(node)
-        if undo is None or not function:  # constants are compiled into kernels, which are kept
+        if undo is None:
+            continue
+        if not function:  # constants are compiled into kernels, which are kept
+            undo()
             continue
         change = " ".join(f"{before} -> {ast.unparse(node)}".split())
         ordinal = seen[function, change] = seen.get((function, change), -1) + 1

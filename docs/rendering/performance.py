@@ -47,7 +47,7 @@ all frames, which is nearer to what the program itself needs where the machine h
 PROFILE = """
 ### Where an edit's time goes
 
-Of the first edit of *enlarged*, a process of its own, 7.0 s of the processors in 4.3 s on the clock:
+Of the first edit of *enlarged*, a process of its own, 7.0 s of the processors in 4.3 on the clock:
 
 | What | Processor s |
 |---|---:|
@@ -238,7 +238,7 @@ def _budgets_of(edits: list[Row], frames: list[Row], solves: list[Row]) -> list[
         _dragged("drag to pixels, 100k plainly coloured Gaussians", cloud, "≤ 35 ms", 35),
         Budget("the same on a real GPU", "≤ 4 ms", "no GPU here", None),
         _clicked(),
-        _timed("lift, 1 MP photo", edits, "lift", 1.5),
+        _timed("lift, 1 MP photo, the background beside it", edits, "lift", 1.5),
         _whole(f"whole `edit`, 1 MP photo, {_backends(edits[0])}", edits, "first", 5),
         _whole("the same again", edits, "again", 3),
         _timed_large(edit_of_large),
@@ -329,7 +329,7 @@ def _clicked() -> Budget:
 def _timed_large(report: Row) -> Budget:
     """The lift of a photo of 24 MP."""
     taken, count = report["seconds"]["lift"], report["object"]["gaussians"]
-    return Budget("lift, 24 MP photo, object on half of it", "≤ 6 s",
+    return Budget("lift, 24 MP photo, object on half of it, likewise", "≤ 6 s",
                   f"{taken:.1f} s, {count:,} Gaussians", taken <= 6)  # fmt: skip
 
 
