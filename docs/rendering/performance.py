@@ -292,11 +292,7 @@ def _felt() -> list[Budget]:
     page, found = (ROOT / "docs/tour/feel.md").read_text(encoding="utf-8"), []
     asked = {
         "hand to picture, in the window": (r"usual number of Gaussians \| (\d+) ms", 33, "ms"),
-        "of nine places of the pointer in ten": (
-            r"usual number of Gaussians .*?\((\d+)\)",
-            50,
-            "ms",
-        ),
+        "the same of nine places in ten": (r"usual number of Gaussians .*?\((\d+)\)", 50, "ms"),
         "a frame of that": (r"usual number of Gaussians (?:.*?\|){3} (\d+) ms", 20, "ms"),
         "a photo of 1 MP opened to its first click's answer": (r"settled it: ([\d.]+) s", 1.5, "s"),
         "start to a drawn window": (r"first frame on the screen: ([\d.]+) s", 1.5, "s"),

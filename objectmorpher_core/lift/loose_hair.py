@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 
 from ..base.arrays import F32, U8, Mask, Pixels, crop, unit_pixels
 from ..base.camera import Camera
-from ..base.masks import LARGE, box_of, disc, reduction
+from ..base.masks import LARGE, Box, box_of, disc, reduction
 from ..base.rotations import quats_along
 from ..base.threads import in_threads
 from ..document.model import HAIR, Gaussians, LiftedObject, Matte, PhotoTexture
@@ -178,7 +178,6 @@ MORE = 1.25  # x the least that it can cover
 FAINTEST = 0.02  # alpha that is kept
 TILE = 1536  # px: what is worked on at a time of a large picture, at 60 bytes a px
 
-Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
 
 def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:

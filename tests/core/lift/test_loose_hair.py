@@ -124,11 +124,16 @@ def test_only_what_ends_in_hair_has_hair_beside_it():
     assert (alpha[middle & (fur <= 0)] > 0.2).mean() > 0.8
 
 
-def test_in_tiles_as_on_a_large_photo_it_is_the_same(monkeypatch):
+def _furry() -> tuple[np.ndarray, Matte]:
+    """A photo (h, w, 3) of fur with loose hairs on a blurred ground, and its cut-out."""
     cover, _ = _hairs(0)
     fur = _fur()
     pixels = _mixed(_ground("blurred", np.random.default_rng(0)), (cover, 20), (fur, 120))
-    matte = Matte(0, 0, fur, np.repeat(fur[..., None], 3, 2))
+    return pixels, Matte(0, 0, fur, np.repeat(fur[..., None], 3, 2))
+
+
+def test_in_tiles_as_on_a_large_photo_it_is_the_same(monkeypatch):
+    pixels, matte = _furry()
     whole = with_loose_hair(pixels, matte)
     assert whole is not matte
     monkeypatch.setattr(loose_hair, "LARGE", 1000)
@@ -144,10 +149,7 @@ def test_in_tiles_as_on_a_large_photo_it_is_the_same(monkeypatch):
 
 def test_of_a_large_photo_no_more_is_taken_for_hair_than_of_the_smaller_one(monkeypatch):
     """Lines are wider there, so that their px count for less beside an outline's length."""
-    cover, _ = _hairs(0)
-    fur = _fur()
-    pixels = _mixed(_ground("blurred", np.random.default_rng(0)), (cover, 20), (fur, 120))
-    matte = Matte(0, 0, fur, np.repeat(fur[..., None], 3, 2))
+    pixels, matte = _furry()
     hairy = with_loose_hair(pixels, matte)
     monkeypatch.setattr(masks, "LARGE", 1000)
     monkeypatch.setattr(masks, "ENOUGH", WIDTH * HEIGHT // 100**2)
