@@ -40,12 +40,13 @@ LATER = {  # than the window's first frame
 }  # fmt: skip
 
 WINDOW_IMPORT = "import objectmorpher.cli.parser, objectmorpher.gui.window.window"
-RUNS = 7
+OTHERS_IMPORT = "import numpy, cv2, imgui_bundle"  # what the window cannot do without
+RUNS, MOST_RUNS = 5, 25
 sys.path.append(str(ROOT / "packaging"))
 
 import bundled  # noqa: E402
 
-MOST_RATIO = 7.0  # it is about 4.5; scipy alone would add 2, torch 20
+MOST_RATIO = 1.8  # it is 1.3 to 1.6; scipy alone would add 0.5 to 1, torch 6
 
 
 def sources(*places: Path) -> list[Path]:
@@ -218,17 +219,21 @@ def loaded_by(code: str) -> set[str]:
 
 
 @pytest.mark.slow
-def test_the_window_imports_in_a_few_times_what_numpy_takes():
+def test_the_window_imports_in_less_than_twice_what_its_libraries_take():
     """Before its first frame: what takes longer is imported when it is needed.
 
-    The least of several runs, taken in turns: what else the machine does only adds to a run.
-    As from the second start on: compiled to bytecode.
+    The least of several runs, taken in turns, and of more of them on a busy machine: what else it
+    does only adds to a run. As from the second start on: compiled to bytecode.
     """
     for folder in (APP, CORE):
         compileall.compile_dir(folder, quiet=1)
-    runs = [[_seconds(code) for code in ("", "import numpy", WINDOW_IMPORT)] for _ in range(RUNS)]
-    bare, numpy, window = (min(column) for column in zip(*runs, strict=True))
-    assert (window - bare) / (numpy - bare) <= MOST_RATIO, runs
+    runs: list[list[float]] = []
+    ratio = MOST_RATIO + 1
+    while len(runs) < RUNS or (ratio > MOST_RATIO and len(runs) < MOST_RUNS):
+        runs.append([_seconds(code) for code in ("", OTHERS_IMPORT, WINDOW_IMPORT)])
+        bare, others, window = (min(column) for column in zip(*runs, strict=True))
+        ratio = (window - bare) / (others - bare)
+    assert ratio <= MOST_RATIO, runs
 
 
 def _seconds(code: str) -> float:

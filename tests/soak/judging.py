@@ -29,7 +29,7 @@ def problems(samples: Sequence[Any]) -> list[str]:
         before, after = (max(getattr(s, name) for s in part) for part in (early, late))
         if after > room * before:
             found.append(f"{name}: {before:.0f} MiB, and {after:.0f} at the end")
-    for name in ("files", "threads", "children", "textures", "buffers"):  # they come and go
+    for name in ("files", "threads", "children"):  # they come and go
         before, after = max(getattr(s, name) for s in early), min(getattr(s, name) for s in late)
         if after > before:
             found.append(f"{name}: {before}, and {after} at the end")
@@ -39,7 +39,8 @@ def problems(samples: Sequence[Any]) -> list[str]:
 def slower(hundreds: Sequence[Any], most: float = SLOWER) -> list[str]:
     """Where the same edits, `session.Hundred`s, take more than `most` x as long at the end.
 
-    The samples' own drags are of objects and handles that become more and fewer.
+    And where they leave more on the GPU. The samples' own drags and textures are of objects and
+    handles that become more and fewer.
     """
     ends = min(ENDS, len(hundreds) // 2)
     found = []
@@ -49,6 +50,10 @@ def slower(hundreds: Sequence[Any], most: float = SLOWER) -> list[str]:
         )
         if last > most * first:
             found.append(f"{name}: {first:.3g}, and {last:.3g} at the end")
+    for name in ("textures", "buffers"):
+        before, after = (getattr(hundreds[k], name) for k in (0, -1))
+        if after > before:
+            found.append(f"{name}: {before}, and {after} at the end")
     return found
 
 

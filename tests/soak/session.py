@@ -73,6 +73,8 @@ class Hundred:
     process: float  # s of all threads, so of OpenGL's in software too
     drag: float  # ms of the main thread in a drag, median
     wall: float  # s
+    textures: int  # of OpenGL, after them
+    buffers: int
 
 
 class Session:
@@ -133,7 +135,7 @@ class Session:
         main, process, wall = (b - a for a, b in zip(begun, ended, strict=True))
         self._chance = usual
         drag = 1e3 * statistics.median(self._drags)
-        return Hundred(self.edits, main, process, drag, wall)
+        return Hundred(self.edits, main, process, drag, wall, *self._on_gpu())
 
     def _one(self, is_drawn: bool) -> None:
         getattr(self, f"_{self._chance.choice(KINDS)}")()
@@ -158,10 +160,6 @@ class Session:
     def measure(self) -> Sample:
         worker = self.editor.jobs._worker
         pid = worker.process.pid if worker is not None and worker.process.is_alive() else None
-        texture, buffer = self._gl.texture((1, 1), 4), self._gl.buffer(reserve=4)
-        counts = _alive("glIsTexture", texture.glo), _alive("glIsBuffer", buffer.glo)
-        texture.release()
-        buffer.release()
         drag = statistics.median(self._drags or [0.0])
         task = Path("/proc/self/task")
         kept = _sizes(Path(os.environ["OBJECTMORPHER_DATA"]))
@@ -170,8 +168,16 @@ class Session:
             self.edits, (time.monotonic() - self._begun) / 60, _resident("self"),
             0.0 if pid is None else _resident(str(pid)), 1e3 * drag,
             len(list(Path("/proc/self/fd").iterdir())), threading.active_count(), len(children),
-            *counts, len(self.editor.history.steps), len(kept), sum(kept) / 2**20,
+            *self._on_gpu(), len(self.editor.history.steps), len(kept), sum(kept) / 2**20,
         )  # fmt: skip
+
+    def _on_gpu(self) -> tuple[int, int]:
+        """How many textures and buffers there are."""
+        texture, buffer = self._gl.texture((1, 1), 4), self._gl.buffer(reserve=4)
+        counts = _alive("glIsTexture", texture.glo), _alive("glIsBuffer", buffer.glo)
+        texture.release()
+        buffer.release()
+        return counts
 
     # ---- edits ------------------------------------------------------------------------------
 
