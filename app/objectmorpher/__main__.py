@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import atexit
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -21,11 +22,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SAMPLE_EDIT = ("--click", "280,150", "--turn", "18,0,0")  # what the first run does headless
 HEADLESS_OUT = Path("objectmorpher-edited.png")
+# Most objects are the modules' own, and stay; to look through them for garbage takes .1 s each time.
+GARBAGE = 50_000, 20, 20  # new objects, and how often younger ones are looked through before older
 FINAL = ("edit", "select", "replay")  # commands that have written everything when they return
 
 
 def run() -> NoReturn:
     """Runs the program as a process of its own, and ends it."""
+    gc.set_threshold(*GARBAGE)
     code = main()
     if sys.argv[1:2] and sys.argv[1] in FINAL:
         _leave(code)

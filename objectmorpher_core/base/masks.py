@@ -1,11 +1,11 @@
-"""What is in a mask: its box, its largest piece, what is near it; and large pictures, reduced."""
+"""What is in a mask: its box, its largest piece, what is near it; and pictures made smaller."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 
-from .arrays import U8, Mask
+from .arrays import F32, U8, Mask
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px
 
@@ -94,3 +94,25 @@ def reduced(image: np.ndarray, times: int, pads: Pads = ((0, 0), (0, 0))) -> np.
 def reduced_mask(mask: Mask, times: int) -> Mask:
     """A mask (H, W): what at least half of `times` x `times` px are in."""
     return reduced(mask.view(np.uint8) * np.uint8(255), times) >= 128
+
+
+def smaller(picture: F32, scale: float) -> F32:
+    """A picture (h, w) or (h, w, 3) so much smaller."""
+    height, width = picture.shape[:2]
+    size = max(round(width * scale), 1), max(round(height * scale), 1)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def widely_blurred(picture: F32, sigma: float, most: float = 12.0) -> F32:
+    """(h, w) or (h, w, 3) blurred by `sigma` px; by more than `most` in a smaller picture."""
+    scale = min(most / sigma, 1.0)
+    blurred = cv2.GaussianBlur(smaller(picture, scale), (0, 0), sigma * scale)
+    return np.asarray(cv2.resize(blurred, picture.shape[1::-1]), np.float32)
+
+
+def bounds(picture: F32, where: Mask) -> tuple[F32, F32]:
+    """(3,) the least and the greatest values of a picture (h, w, 3) `where` (h, w) one is."""
+    part = where.astype(np.uint8)
+    ends = [cv2.minMaxLoc(channel, part)[:2] for channel in cv2.split(picture)]
+    least, greatest = np.array(ends, np.float32).T
+    return least, greatest

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+GROWN = 1.05  # x the memory
 SLOWER = 1.1  # x the time of the same edits at the beginning
 ENDS = 3  # of the repeated edits at either end, whose least time counts: others load the machine
 WIDTH, HEIGHT, LEFT, TOP, GAP = 720, 150, 60, 24, 40  # px of a panel, and around it
@@ -25,10 +26,9 @@ def problems(samples: Sequence[Any]) -> list[str]:
     quarter = len(samples) // 4
     early, late = samples[quarter : 2 * quarter], samples[-quarter:]
     found = []
-    for name, room in (("memory", 1.05), ("worker", 1.05)):
-        before, after = (max(getattr(s, name) for s in part) for part in (early, late))
-        if after > room * before:
-            found.append(f"{name}: {before:.0f} MiB, and {after:.0f} at the end")
+    before, after = (max(s.worker for s in part) for part in (early, late))
+    if after > GROWN * before:
+        found.append(f"worker: {before:.0f} MiB, and {after:.0f} at the end")
     for name in ("files", "threads", "children"):  # they come and go
         before, after = max(getattr(s, name) for s in early), min(getattr(s, name) for s in late)
         if after > before:
@@ -39,8 +39,8 @@ def problems(samples: Sequence[Any]) -> list[str]:
 def slower(hundreds: Sequence[Any], most: float = SLOWER) -> list[str]:
     """Where the same edits, `session.Hundred`s, take more than `most` x as long at the end.
 
-    And where they leave more on the GPU. The samples' own drags and textures are of objects and
-    handles that become more and fewer.
+    And where they leave more in memory or on the GPU. The samples' own are of objects and handles
+    that become more and fewer.
     """
     ends = min(ENDS, len(hundreds) // 2)
     found = []
@@ -50,10 +50,10 @@ def slower(hundreds: Sequence[Any], most: float = SLOWER) -> list[str]:
         )
         if last > most * first:
             found.append(f"{name}: {first:.3g}, and {last:.3g} at the end")
-    for name in ("textures", "buffers"):
+    for name, room in (("memory", GROWN), ("textures", 1.0), ("buffers", 1.0)):
         before, after = (getattr(hundreds[k], name) for k in (0, -1))
-        if after > before:
-            found.append(f"{name}: {before}, and {after} at the end")
+        if after > room * before:
+            found.append(f"{name}: {before:.4g}, and {after:.4g} at the end")
     return found
 
 

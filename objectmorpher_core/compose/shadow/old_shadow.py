@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, Mask, Pixels, crop, pixels_from_unit, unit_pixels
-from ...base.masks import disc
+from ...base.masks import disc, smaller, widely_blurred
 from ...base.progress import Progress, silent
 from ...document.model import Plate
 from ...document.settings import Hint, Shadow
@@ -41,7 +41,6 @@ FIRST, GROWTH = 1.0, 1.5  # px between distances at the edge, and x from each to
 LEAST = np.float32(1e-3)  # of the px around, that must be at a distance for its light to be known
 MOST = 1.6  # x, that any light is changed by
 FEW, MANY = 3.0, 12.0  # px per cell, of a coarser picture on which something is measured
-SMALL = 12.0  # px: a wider blur is one of a smaller picture
 DIM = -3.2  # natural logarithm of light, from which a dark ground shows what it looks like
 DIM_OVER = 0.5  # cells, over which that is measured
 LIT = 0.05  # natural logarithm of missing light, from which ground is not lit
@@ -61,8 +60,8 @@ def usual_light(light: F32, missing: F32, free: Mask, pitch: float) -> F32:
     height, width = light.shape
     weight = (free & (missing < LIT)).astype(np.float32)
     scale = min(FEW / pitch, 1.0)
-    small = _shrunk(weight, scale)
-    values = _shrunk(light * weight, scale)
+    small = smaller(weight, scale)
+    values = smaller(light * weight, scale)
     total, mean = np.zeros_like(small), np.zeros_like(small)
     for k, cells in enumerate(CONTINUED):
         share, sigma = np.float32(100.0**-k), cells * pitch * scale
@@ -71,20 +70,6 @@ def usual_light(light: F32, missing: F32, free: Mask, pitch: float) -> F32:
     known = float(np.median(light[weight > 0])) if weight.any() else 0.0
     usual = ((mean + 1e-9 * known) / (total + 1e-9)).astype(np.float32)
     return np.asarray(cv2.resize(usual, (width, height)), np.float32)
-
-
-def widely_blurred(picture: F32, sigma: float) -> F32:
-    """(h, w) or (h, w, 3) blurred by `sigma` px; where that is much, by way of a smaller one."""
-    scale = min(SMALL / sigma, 1.0)
-    blurred = cv2.GaussianBlur(_shrunk(picture, scale), (0, 0), sigma * scale)
-    return np.asarray(cv2.resize(blurred, picture.shape[1::-1]), np.float32)
-
-
-def _shrunk(picture: F32, scale: float) -> F32:
-    """A picture (h, w) or (h, w, 3) so much smaller."""
-    height, width = picture.shape[:2]
-    size = max(round(width * scale), 1), max(round(height * scale), 1)
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def bounded(missing: F32, light: F32, usual: F32, pitch: float) -> F32:
@@ -143,7 +128,7 @@ def evened(lit: F32, missing: F32, free: Mask, pitch: float) -> F32:
     """
     height, width = missing.shape
     scale = min(MANY / pitch, 1.0)
-    small, gap, seen = (_shrunk(p, scale) for p in (lit, missing, free.astype(np.float32)))
+    small, gap, seen = (smaller(p, scale) for p in (lit, missing, free.astype(np.float32)))
     factor = _factor(small, gap, seen > 1 - HALF, pitch * scale)
     factor = cv2.resize(factor, (width, height))
     return np.asarray(np.clip(lit * factor, 0, 1), np.float32)
@@ -222,7 +207,7 @@ def _from_edge(missing: F32, pitch: float) -> F32:
     height, width = missing.shape
     scale = min(FEW / pitch, 1.0)
     near = disc(round(NEAR_BY * pitch * scale))
-    deepest = cv2.resize(cv2.dilate(_shrunk(missing, scale), near), (width, height))
+    deepest = cv2.resize(cv2.dilate(smaller(missing, scale), near), (width, height))
     is_shade = missing > np.maximum(HALF * deepest, SEEN_EDGE)
     if not is_shade.any() or is_shade.all():
         return np.zeros_like(missing)

@@ -13,10 +13,11 @@ import numpy as np
 
 from ...base.arrays import F32, Mask, frozen
 from ...base.kernel_files import numba
+from ...base.masks import bounds, box_of, widely_blurred
 
 PATCH = 24  # px to a side
 OVERLAP = 8  # px, of neighbours
-COARSE = 9.0  # px, standard deviation: what is coarser is given
+COARSE, ROUGHLY = 9.0, 3.0  # px, standard deviation: what is coarser is given; of a small picture
 STRIDE = 3  # px, between the places that patches are taken from
 MOST = 4_000  # such places
 ELSEWHERE = 1.0  # weight of squared levels of the coarse colours, beside those of the detail
@@ -57,30 +58,44 @@ def quilted(levels: F32, known: Mask, clear: Mask, hole: Mask, heights: F32, see
     wanted = hole & (plain > 0)
     if not wanted.any():
         return levels
-    low = np.asarray(cv2.GaussianBlur(levels, (0, 0), COARSE), np.float32)
-    share = cv2.GaussianBlur(known.astype(np.float32), (0, 0), COARSE)
-    own = cv2.GaussianBlur(levels * known[..., None], (0, 0), COARSE)
+    low = widely_blurred(levels, COARSE, ROUGHLY)
+    share = widely_blurred(known.astype(np.float32), COARSE, ROUGHLY)
+    own = widely_blurred(levels * known[..., None], COARSE, ROUGHLY)
     own /= np.maximum(share, 1e-3)[..., None]
-    detail = np.where(known[..., None], levels - own, 0)
-    grey = _grey(detail)[..., None]
-    detail = (grey + COLOURED * (detail - grey)).astype(np.float32)
+    detail = np.where(known[..., None], levels - own, np.float32(0))
+    colourless = grey(detail)[..., None]
+    detail = (colourless + COLOURED * (detail - colourless)).astype(np.float32)
     order = _order(wanted, known)
     odd, usual = _oddness(detail, places + middle)
     chance = 1 + ALIKE * rng.random((len(order), CHANCES))
     fields = (frozen(field, np.float32) for field in (low, own, heights))
     costs = frozen(odd, np.float64), USED * usual, chance
     taken = _quilt(detail, known & ~hole, frozen(wanted), *fields, frozen(places), order, costs)
-    gain = ((_grey(low) + DARK) / (_grey(taken) + DARK)).clip(*GAIN)
+    x0, y0, x1, y1 = box_of(wanted, PATCH)
+    there = np.s_[y0:y1, x0:x1]
+    change = plain[there][..., None] * _fitting(
+        levels[there], low[there], taken[there], detail[there], wanted[there]
+    )
+    made = (levels[there] + change).clip(*bounds(levels, known))
+    filled = levels.copy()
+    filled[there] = np.where(wanted[there][..., None], made, levels[there])
+    return filled
+
+
+def _fitting(levels: F32, low: F32, taken: F32, detail: F32, wanted: Mask) -> F32:
+    """(h, w, 3) how the `detail` changes `levels`, lit as these; little of something else.
+
+    `low` and `taken` are the coarse colours there, and where the detail comes from.
+    """
+    gain = ((grey(low) + DARK) / (grey(taken) + DARK)).clip(*GAIN)
     made_of = wanted.astype(np.float32)
     off = cv2.GaussianBlur((taken - low) * made_of[..., None], (0, 0), NEARBY)
     off /= np.maximum(cv2.GaussianBlur(made_of, (0, 0), NEARBY), 1e-3)[..., None]
-    gain *= np.exp(-((3 * _grey(off * off) / OTHER**2) ** 2))
-    made = levels + plain[..., None] * (low + gain[..., None] * detail - levels)
-    made = made.clip(levels[known].min(0), levels[known].max(0))
-    return np.where(wanted[..., None], made, levels).astype(np.float32)
+    gain *= np.exp(-((3 * grey(off * off) / OTHER**2) ** 2))
+    return low + gain[..., None] * detail - levels
 
 
-def _grey(colors: F32) -> F32:
+def grey(colors: F32) -> F32:
     """(h, w) of colours (h, w, 3): their mean."""
     return np.asarray(cv2.transform(colors, np.full((1, 3), 1 / 3)), np.float32)
 
@@ -91,8 +106,8 @@ def _plainness(levels: F32, clear: Mask, hole: Mask) -> F32:
     Along the direction in which there is least: streaks are plain. What is striped itself lacks
     nothing: its stripes go on, and are no texture. On every second pixel.
     """
-    grey = cv2.GaussianBlur(_grey(levels), (0, 0), FINE)[::2, ::2]
-    x, y = np.gradient(grey, axis=1), np.gradient(grey, axis=0)
+    fine = cv2.GaussianBlur(grey(levels), (0, 0), FINE)[::2, ::2]
+    x, y = np.gradient(fine, axis=1), np.gradient(fine, axis=0)
     weak, strong = [], []
     for where in (clear[::2, ::2].astype(np.float32), hole[::2, ::2].astype(np.float32)):
         products = np.dstack([x * x, x * y, y * y, np.ones_like(x)]) * where[..., None]
@@ -122,7 +137,7 @@ def _order(hole: Mask, known: Mask) -> np.ndarray:
 
 def _oddness(detail: F32, middles: np.ndarray) -> tuple[np.ndarray, float]:
     """(n,) squared levels by which patches about places (n, 2) stand out, and what is usual."""
-    power = cv2.boxFilter((detail**2).sum(-1), -1, (SPOT, SPOT))
+    power = cv2.boxFilter(3 * grey(detail * detail), -1, (SPOT, SPOT))
     power = cv2.dilate(power, np.ones((PATCH, PATCH), np.uint8))[middles[:, 0], middles[:, 1]]
     usual = max(float(np.median(power)), 1e-3)
     return usual * np.maximum(power / usual / STRANGE - 1, 0), usual

@@ -13,6 +13,7 @@ carries the photo: it is as sharp, and stays the same however the object turns.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -20,6 +21,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, U8, Mask
 from ...base.camera import Camera
+from ...base.masks import bounds, widely_blurred
 from ...base.progress import silent
 from ...base.threads import in_threads
 from ...compose.light.lighting import estimate_light
@@ -33,10 +35,10 @@ from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats, projection_jacobians
 from ...raster.reference import Picture3D
 from ...raster.rules import RULES
-from ...raster.texture import build_levels
+from ...raster.texture import TextureLevels, build_levels
 from .canvas import bilinear
 from .colours import fill_in
-from .quilting import quilted
+from .quilting import grey, quilted
 from .silhouette import inwardness
 
 AWAY = 45.0  # degrees: sides that this turn shows are textured as they look after it
@@ -69,6 +71,7 @@ BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the col
 INWARD = 0.4  # of the matte's fringe, up to which its colours are not the object's
 EVEN, SMOOTH = 3.0, 8.0  # px, over which the border at which the photo is mirrored is evened
 LIKE, UNLIKE = 8.0, 50.0  # px over which its colours are compared; levels by which others are off
+ROUGHLY = 3.0  # px: a wider blur is one of a smaller picture
 DARK = 24.0  # levels of all channels, in which no light is to be measured
 ALONG = 40  # px from a fringe: what has none has edges, where another face begins
 BENT = 2.5  # of its area, by which it may be larger or smaller
@@ -91,6 +94,12 @@ class _Shot:
     matte: Matte
     inward: F32  # (h, w) how far inside its fringe a pixel of the matte is
     camera: Camera
+
+    @cached_property
+    def levels(self) -> TextureLevels:
+        """The object's colours, also where its matte is faint."""
+        whole = np.ones(self.matte.alpha.shape, np.float32)
+        return build_levels(self.matte.foreground, whole, self.matte.left, self.matte.top)
 
     def is_fringe(self, rest: RestSplats) -> Mask:
         """(N,) which Gaussians reach into the matte's fringe."""
@@ -154,11 +163,9 @@ class _View:
             texture=replace(texture, visibility=carried.astype(np.float32)),
         )  # fmt: skip
         splats = PosedSplats(RestSplats(own, photo).unfaded(), None, self.motion)
-        whole = np.ones(matte.alpha.shape, np.float32)
-        levels = build_levels(matte.foreground, whole, matte.left, matte.top)
-        picture = tiles.render(splats, levels, self.camera, photo)
-        brighter = tiles.render(splats.brightened(), levels, self.camera, photo)
-        invented = (brighter.color - picture.color).mean(-1)  # beyond the frame nothing is, too
+        picture = tiles.render(splats, shot.levels, self.camera, photo)
+        brighter = tiles.render(splats.brightened(), shot.levels, self.camera, photo)
+        invented = grey(brighter.color - picture.color)  # beyond the frame nothing is, too
         straight = picture.color / np.maximum(picture.alpha, 1e-6)[..., None]
         is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
         looks = self._looks(picture, photo)
@@ -426,8 +433,8 @@ def _filled(side: _Side, front: SidePicture, seed: int) -> U8 | None:
     colors = np.where(completion.hole[..., None], toned, small)
     crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
     colors = np.clip(colors, 0, 255).astype(np.float32)
-    own = levels[picture.is_object]  # neither is what is invented lighter or darker
-    filled = with_detail(crop, whole, colors, completion.sources).clip(own.min(0), own.max(0))
+    ends = bounds(levels, picture.is_object)  # neither is what is invented lighter or darker
+    filled = with_detail(crop, whole, colors, completion.sources).clip(*ends)
     share = _alike(completion.colors, coarse, small, sure)
     share = np.where(whole, cv2.resize(share, hole.shape[::-1]), 1.0)[..., None]
     filled = (crop + share * (filled.astype(np.float32) - crop)).astype(np.float32)
@@ -495,10 +502,9 @@ def standing_out(levels: F32, where: Mask) -> Mask:
 def _mean(levels: F32, where: Mask, sigma: float) -> F32:
     """(h, w, 3) local means of `levels` (h, w, 3) over `where` (h, w)."""
     weight = where.astype(np.float32)
-    total = cv2.GaussianBlur(levels * weight[..., None], (0, 0), sigma)
-    return np.asarray(
-        total / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-3)[..., None], np.float32
-    )
+    total = widely_blurred(levels * weight[..., None], sigma, ROUGHLY)
+    share = widely_blurred(weight, sigma, ROUGHLY)
+    return np.asarray(total / np.maximum(share, 1e-3)[..., None], np.float32)
 
 
 def _heights(side: _Side, front: SidePicture, size: tuple[int, int]) -> F32:
