@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SAMPLE_EDIT = ("--click", "280,150", "--turn", "18,0,0")  # what the first run does headless
 HEADLESS_OUT = Path("objectmorpher-edited.png")
-# Most objects are the modules' own, and stay; to look through them for garbage takes .1 s each time.
+# Most objects are the modules' own, and stay; to look for garbage among them takes .1 s each time.
 GARBAGE = 50_000, 20, 20  # new objects, and how often younger ones are looked through before older
 FINAL = ("edit", "select", "replay")  # commands that have written everything when they return
 
