@@ -211,13 +211,6 @@ class PosedSplats:
         """Return the same object in own `colors` (N, 3), see `RestSplats.recoloured`."""
         return replace(self, rest=self.rest.recoloured(colors))
 
-    def brightened(self) -> PosedSplats:
-        """Return the same object in its own colours brighter by 1.
-
-        What it shows of the photo is as it was: the difference between both says where that is.
-        """
-        return self.recoloured(self.rest.lifted.gaussians.colors + np.float32(1))
-
     @property
     def is_layered(self) -> bool:
         """Whether the picture is made of layers, and not of Gaussians one by one."""

@@ -7,7 +7,7 @@ is then drawn by itself with its sums in the processor's cache: in layers where 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from .compositing import PhotoLookup
 from .posed import PosedSplats
 from .projection import project
 from .reference import Picture3D
-from .rules import AYX, AYY, CX, CY, EX, EY, RULES, SY, WEIGHT
+from .rules import AYX, AYY, BLUE, CX, CY, EX, EY, RED, RULES, SY, WEIGHT
 from .surface import draw_layers
 from .texture import TextureLevels
 
@@ -89,6 +89,20 @@ def draw(
     out = np.empty((bottom - top, right - left, 8), np.float32)
     _draw(drawable, texture, (left, top), out, _NO_RGBA)
     return Picture3D(out[..., :3], out[..., 3], out[..., 4], out[..., 5], out[..., 6:8])
+
+
+def draw_with_share(drawable: Drawable, texture: TextureLevels) -> tuple[Picture3D, F32]:
+    """The whole view, and (h, w) how much of each pixel shows the Gaussians' own colours.
+
+    The rest shows the photo. Colours brighter by 1 make a picture that is as much brighter.
+    """
+    picture = draw(drawable, texture)
+    projected = drawable.projected.copy()
+    projected[:, RED : BLUE + 1] += 1
+    brighter = draw(replace(drawable, projected=frozen(projected)), texture)
+    change = brighter.color - picture.color
+    share = (change[..., 0] + change[..., 1] + change[..., 2]) / np.float32(3)
+    return picture, np.asarray(share, np.float32)
 
 
 def draw_rgba(

@@ -198,11 +198,10 @@ def find_grain(
     if grid is None:
         return None
     own = grid.camera(camera)
-    picture = tiles.draw(tiles.prepare(splats, own, camera), texture)
+    picture, invented = tiles.draw_with_share(tiles.prepare(splats, own, camera), texture)
     # Where the photo would be stretched too far, or has shown nothing, it is not shown.
-    other = tiles.draw(tiles.prepare(splats.brightened(), own, camera), texture)
-    shown = picture.alpha - (other.color - picture.color).mean(2)
-    share = np.clip(shown / np.maximum(picture.alpha, FAINT), 0, 1)
+    shown = (picture.alpha - invented) / np.maximum(picture.alpha, FAINT)
+    share = np.asarray(np.clip(shown, 0, 1), np.float32)
     amount = _missing(share[..., None] ** 2 * _kept(picture, share, grid, noise) * _sharp(blur))
     amount = _continued(amount, np.minimum(picture.alpha, 1))
     if amount.max() < LEAST:

@@ -226,9 +226,7 @@ def _drawn(
     """The object at a pose, and where (h, w) its picture is of the photo of `camera`."""
     splats = PosedSplats(RestSplats(replace(lifted, sides=None), camera), None, pose)
     texture = build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
-    drawn = tiles.render(splats, texture, window, camera)
-    brighter = tiles.render(splats.brightened(), texture, window, camera)
-    invented = (brighter.color - drawn.color).mean(-1)
+    drawn, invented = tiles.draw_with_share(tiles.prepare(splats, window, camera), texture)
     return drawn, (drawn.alpha > WHOLE) & (invented < INVENTED * drawn.alpha)
 
 

@@ -63,7 +63,7 @@ def quilted(levels: F32, known: Mask, clear: Mask, hole: Mask, heights: F32, see
     own = widely_blurred(levels * known[..., None], COARSE, ROUGHLY)
     own /= np.maximum(share, 1e-3)[..., None]
     detail = np.where(known[..., None], levels - own, np.float32(0))
-    colourless = grey(detail)[..., None]
+    colourless = _grey(detail)[..., None]
     detail = (colourless + COLOURED * (detail - colourless)).astype(np.float32)
     order = _order(wanted, known)
     odd, usual = _oddness(detail, places + middle)
@@ -87,15 +87,15 @@ def _fitting(levels: F32, low: F32, taken: F32, detail: F32, wanted: Mask) -> F3
 
     `low` and `taken` are the coarse colours there, and where the detail comes from.
     """
-    gain = ((grey(low) + DARK) / (grey(taken) + DARK)).clip(*GAIN)
+    gain = ((_grey(low) + DARK) / (_grey(taken) + DARK)).clip(*GAIN)
     made_of = wanted.astype(np.float32)
     off = cv2.GaussianBlur((taken - low) * made_of[..., None], (0, 0), NEARBY)
     off /= np.maximum(cv2.GaussianBlur(made_of, (0, 0), NEARBY), 1e-3)[..., None]
-    gain *= np.exp(-((3 * grey(off * off) / OTHER**2) ** 2))
+    gain *= np.exp(-((3 * _grey(np.asarray(off * off, np.float32)) / OTHER**2) ** 2))
     return low + gain[..., None] * detail - levels
 
 
-def grey(colors: F32) -> F32:
+def _grey(colors: F32) -> F32:
     """(h, w) of colours (h, w, 3): their mean."""
     return np.asarray(cv2.transform(colors, np.full((1, 3), 1 / 3)), np.float32)
 
@@ -106,7 +106,7 @@ def _plainness(levels: F32, clear: Mask, hole: Mask) -> F32:
     Along the direction in which there is least: streaks are plain. What is striped itself lacks
     nothing: its stripes go on, and are no texture. On every second pixel.
     """
-    fine = cv2.GaussianBlur(grey(levels), (0, 0), FINE)[::2, ::2]
+    fine = cv2.GaussianBlur(_grey(levels), (0, 0), FINE)[::2, ::2]
     x, y = np.gradient(fine, axis=1), np.gradient(fine, axis=0)
     weak, strong = [], []
     for where in (clear[::2, ::2].astype(np.float32), hole[::2, ::2].astype(np.float32)):
@@ -137,7 +137,7 @@ def _order(hole: Mask, known: Mask) -> np.ndarray:
 
 def _oddness(detail: F32, middles: np.ndarray) -> tuple[np.ndarray, float]:
     """(n,) squared levels by which patches about places (n, 2) stand out, and what is usual."""
-    power = cv2.boxFilter(3 * grey(detail * detail), -1, (SPOT, SPOT))
+    power = cv2.boxFilter(3 * _grey(detail * detail), -1, (SPOT, SPOT))
     power = cv2.dilate(power, np.ones((PATCH, PATCH), np.uint8))[middles[:, 0], middles[:, 1]]
     usual = max(float(np.median(power)), 1e-3)
     return usual * np.maximum(power / usual / STRANGE - 1, 0), usual

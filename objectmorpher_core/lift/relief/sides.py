@@ -38,7 +38,7 @@ from ...raster.rules import RULES
 from ...raster.texture import TextureLevels, build_levels
 from .canvas import bilinear
 from .colours import fill_in
-from .quilting import grey, quilted
+from .quilting import quilted
 from .silhouette import inwardness
 
 AWAY = 45.0  # degrees: sides that this turn shows are textured as they look after it
@@ -163,9 +163,8 @@ class _View:
             texture=replace(texture, visibility=carried.astype(np.float32)),
         )  # fmt: skip
         splats = PosedSplats(RestSplats(own, photo).unfaded(), None, self.motion)
-        picture = tiles.render(splats, shot.levels, self.camera, photo)
-        brighter = tiles.render(splats.brightened(), shot.levels, self.camera, photo)
-        invented = grey(brighter.color - picture.color)  # beyond the frame nothing is, too
+        drawable = tiles.prepare(splats, self.camera, photo)
+        picture, invented = tiles.draw_with_share(drawable, shot.levels)  # nothing beyond the frame
         straight = picture.color / np.maximum(picture.alpha, 1e-6)[..., None]
         is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
         looks = self._looks(picture, photo)
