@@ -27,12 +27,9 @@ def problems(samples: Sequence[Any]) -> list[str]:
     quarter = len(samples) // 4
     early, late = samples[quarter : 2 * quarter], samples[-quarter:]
     found = []
-    for name in ("memory", "worker"):  # median: the most depends on the objects at that moment
-        before, after = (
-            statistics.median(getattr(s, name) for s in part) for part in (early, late)
-        )
-        if after > GROWN * before:
-            found.append(f"{name}: {before:.0f} MiB, and {after:.0f} at the end")
+    before, after = (max(s.worker for s in part) for part in (early, late))
+    if after > GROWN * before:
+        found.append(f"worker: {before:.0f} MiB, and {after:.0f} at the end")
     for name in ("files", "threads", "children"):  # they come and go
         before, after = max(getattr(s, name) for s in early), min(getattr(s, name) for s in late)
         if after > before:
@@ -43,8 +40,8 @@ def problems(samples: Sequence[Any]) -> list[str]:
 def slower(hundreds: Sequence[Any], most: float = SLOWER) -> list[str]:
     """Where the same edits, `session.Hundred`s, take more than `most` x as long at the end.
 
-    And where they leave more on the GPU. The samples' own are of objects and handles that become
-    more and fewer.
+    And where they leave more in memory or on the GPU. The samples' own are of objects and handles
+    that become more and fewer. The first quarter fills memory, and is not judged.
     """
     ends = min(ENDS, len(hundreds) // 2)
     found = []
@@ -54,6 +51,13 @@ def slower(hundreds: Sequence[Any], most: float = SLOWER) -> list[str]:
         )
         if last > most * first:
             found.append(f"{name}: {first:.3g}, and {last:.3g} at the end")
+    quarter = max(len(hundreds) // 4, 1)
+    before, after = (
+        statistics.median(h.memory for h in part)
+        for part in (hundreds[quarter : 2 * quarter + 1], hundreds[-quarter:])
+    )
+    if after > GROWN * before:
+        found.append(f"memory: {before:.0f} MiB, and {after:.0f} at the end")
     for name in ("textures", "buffers"):
         before, after = (getattr(hundreds[k], name) for k in (0, -1))
         if after > before:

@@ -73,7 +73,8 @@ class Hundred:
     process: float  # s of all threads, so of OpenGL's in software too
     drag: float  # ms of the main thread in a drag, median
     wall: float  # s
-    textures: int  # of OpenGL, after them
+    memory: float  # MiB resident, of the editor, after them
+    textures: int  # of OpenGL, likewise
     buffers: int
 
 
@@ -135,7 +136,7 @@ class Session:
         main, process, wall = (b - a for a, b in zip(begun, ended, strict=True))
         self._chance = usual
         drag = 1e3 * statistics.median(self._drags)
-        return Hundred(self.edits, main, process, drag, wall, *self._on_gpu())
+        return Hundred(self.edits, main, process, drag, wall, _resident("self"), *self._on_gpu())
 
     def _one(self, is_drawn: bool) -> None:
         getattr(self, f"_{self._chance.choice(KINDS)}")()

@@ -27,7 +27,7 @@ def test_what_stays_as_it_is_is_no_problem() -> None:
     assert problems(level(40)) == []
 
 
-@pytest.mark.parametrize("name", ["memory", "worker", "files", "threads", "children"])
+@pytest.mark.parametrize("name", ["worker", "files", "threads", "children"])
 def test_what_grows_is_told(name: str) -> None:
     grown = [replace(s, **{name: getattr(s, name) * (1 + k / 20)}) for k, s in enumerate(level(40))]
     (problem,) = problems(grown)
@@ -35,17 +35,17 @@ def test_what_grows_is_told(name: str) -> None:
 
 
 def test_what_becomes_slower_is_told() -> None:
-    even = [Hundred(k, 2.0 + 0.3 * (k % 2), 3.0, 50.0, 9.0, 30, 8) for k in range(10)]
+    even = [Hundred(k, 2.0 + 0.3 * (k % 2), 3.0, 50.0, 9.0, 600.0, 30, 8) for k in range(10)]
     assert slower(even) == []
     slowing = [replace(h, drag=50.0 * (1 + k / 20)) for k, h in enumerate(even)]
     (problem,) = slower(slowing)
     assert problem.startswith("drag")
 
 
-@pytest.mark.parametrize("name", ["textures", "buffers"])
-def test_what_the_same_edits_leave_on_the_gpu_is_told(name: str) -> None:
-    hundreds = [Hundred(k, 2.0, 3.0, 50.0, 9.0, 30, 8) for k in range(4)]
-    hundreds[-1] = replace(hundreds[-1], **{name: getattr(hundreds[-1], name) + 1})
+@pytest.mark.parametrize("name", ["memory", "textures", "buffers"])
+def test_what_the_same_edits_leave_behind_is_told(name: str) -> None:
+    hundreds = [Hundred(k, 2.0, 3.0, 50.0, 9.0, 600.0, 30, 8) for k in range(4)]
+    hundreds[-1] = replace(hundreds[-1], **{name: 1.06 * getattr(hundreds[-1], name)})
     (problem,) = slower(hundreds)
     assert problem.startswith(name)
 
