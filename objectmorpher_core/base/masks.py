@@ -44,14 +44,13 @@ def dilated(mask: Mask, radius: int) -> Mask:
     return cv2.dilate(mask.astype(np.uint8), disc(radius)) > 0
 
 
-# Pictures of a hundred megapixels, and the smaller ones in which something of them is decided.
+# Pictures of tens of megapixels, and the smaller ones in which something of them is decided.
 #
 # What is decided for a whole object, as its shape, is the same in a picture of a few megapixels;
-# there it takes seconds and hardly any memory. Up to `LARGE` px nothing is reduced: what an
-# ordinary camera takes is looked at as it is.
+# there it takes a second or two and hardly any memory.
 
-LARGE = 30_000_000  # px
-ENOUGH = 8_000_000  # px, of what a larger picture is reduced to, at most
+LARGE = 30_000_000  # px, from which on a picture is worked on by parts
+ENOUGH = 4_000_000  # px, of what a picture of more than twice as many is reduced to, at most
 STRIP = 128  # rows of the smaller picture that are made at a time
 
 Pads = tuple[tuple[int, int], tuple[int, int]]  # px above and below, left and right
@@ -60,7 +59,7 @@ Pads = tuple[tuple[int, int], tuple[int, int]]  # px above and below, left and r
 def reduction(shape: tuple[int, ...]) -> int:
     """By how much the sides of a picture (H, W, ...) are divided; 1 for what is not large."""
     size, times = shape[0] * shape[1], 1
-    if size > LARGE:
+    if size > 2 * ENOUGH:
         while size > ENOUGH * times**2:
             times *= 2
     return times

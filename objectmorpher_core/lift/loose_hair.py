@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 
 from ..base.arrays import F32, U8, Mask, Pixels, crop, unit_pixels
 from ..base.camera import Camera
-from ..base.masks import LARGE, Box, box_of, disc, reduction
+from ..base.masks import Box, box_of, disc, reduction
 from ..base.rotations import quats_along
 from ..base.threads import in_threads
 from ..document.model import HAIR, Gaussians, LiftedObject, Matte, PhotoTexture
@@ -179,7 +179,6 @@ FAINTEST = 0.02  # alpha that is kept
 TILE = 1536  # px: what is worked on at a time of a large picture, at 60 bytes a px
 
 
-
 def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:
     """A `matte` of the photo (H, W, 3) and the hair beside it; the same one where there is none."""
     hair = hair_of(matte.alpha)
@@ -214,7 +213,7 @@ def with_loose_hair(pixels: Pixels, matte: Matte) -> Matte:
 def _tiles(box: Box) -> list[Box]:
     """The parts of a box that are worked on at a time: all of it, where it is not large."""
     x0, y0, x1, y1 = box
-    side = max(x1 - x0, y1 - y0) if (x1 - x0) * (y1 - y0) <= LARGE else TILE
+    side = max(x1 - x0, y1 - y0) if (x1 - x0) * (y1 - y0) <= 2 * TILE**2 else TILE
     return [
         (left, top, min(left + side, x1), min(top + side, y1))
         for top in range(y0, y1, side) for left in range(x0, x1, side)
@@ -229,9 +228,9 @@ def _unmixed(
     `reaches`: the margin, and how far around the box is looked, px.
     """
     (margin, context), (height, width) = reaches, loose.shape
-    around = int(np.ceil(context))
-    x0, y0 = max(own[0] - around, 0), max(own[1] - around, 0)
-    x1, y1 = min(own[2] + around, width), min(own[3] + around, height)
+    reach = int(np.ceil(context))
+    x0, y0 = max(own[0] - reach, 0), max(own[1] - reach, 0)
+    x1, y1 = min(own[2] + reach, width), min(own[3] + reach, height)
     part = np.s_[y0:y1, x0:x1]
     rgb, there = unit_pixels(pixels[part]), loose[part]
     is_bare = ~covered[part] & (cv2.dilate(there.astype(np.uint8), disc(2)) == 0)
@@ -242,15 +241,17 @@ def _unmixed(
         side, share = 2 * int(np.ceil(size * margin)) + 1, np.float32(100.0**-n)
         total += share * cv2.blur(bare, (side, side))
         behind += share * cv2.blur(shown, (side, side))
-    behind /= total[..., None]
-    change = (rgb - behind) * there[..., None]
-    room = np.maximum(np.where(change > 0, 1 - behind, behind), 1e-3)
-    alpha = (MORE * (np.abs(change) / room).max(-1)).clip(0, 1)
-    alpha = np.where(alpha >= FAINTEST, alpha, 0).astype(np.float32)
-    colours = (behind + change / np.maximum(alpha, FAINTEST)[..., None]).clip(0, 1)
+    seen, around = rgb[there], behind[there] / total[there][:, None]
+    change = seen - around
+    room = np.maximum(np.where(change > 0, 1 - around, around), 1e-3)
+    share = (MORE * (np.abs(change) / room).max(-1)).clip(0, 1)
+    share = np.where(share >= FAINTEST, share, 0).astype(np.float32)
+    alpha, colours = np.zeros(there.shape, np.float32), np.zeros_like(rgb)
+    alpha[there] = share
+    colours[there] = (around + change / np.maximum(share, FAINTEST)[:, None]).clip(0, 1)
     left, top, right, bottom = own
     inner = np.s_[top - y0 : bottom - y0, left - x0 : right - x0]
-    return alpha[inner], np.asarray(colours[inner], np.float32)
+    return alpha[inner], colours[inner]
 
 
 UNEVEN = 0.3  # x what is usual between two Gaussians, by which these are off a grid

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64, U8, Mask, crop
 from ...base.kernel_files import numba
-from ...base.masks import box_of, dilated, disc
+from ...base.masks import box_of, dilated, disc, reduced, reduced_mask
 from ...base.poisson_disk import distance_inside
 from ...document.model import Matte
 from ...segment.matting.matte import band_width, extended_mask, frame_extension, is_large
@@ -273,6 +273,7 @@ LEAST = 12.0  # x the band squared: area of that
 OFF = 3.0  # x the band, that it is deep somewhere: elsewhere an edge is never so far off
 BESIDE = 2.0  # x the band, around what is not: strands there are none of the body
 PIECE = 0.05  # of the largest piece, at least, else it is a lock of hair
+FINE = 6.0  # px of a band, at least, in a smaller picture of what is large
 
 
 def solid_part(mask: Mask, matte: Matte) -> Mask:
@@ -286,7 +287,21 @@ def solid_part(mask: Mask, matte: Matte) -> Mask:
         return mask
     box = box_of(mask, int(3 * band) + 2)
     window = np.s_[box[1] : box[3], box[0] : box[2]]
-    part, alpha, spot = mask[window], crop(matte.alpha, matte.box, box), disc(int(np.ceil(band)))
+    part, alpha = mask[window], crop(matte.alpha, matte.box, box)
+    times = max(int(band / FINE), 1)
+    hair = _hair(reduced_mask(part, times), reduced(alpha, times), band / times)
+    if hair is None:
+        return mask
+    height, width = (times * side for side in hair.shape)
+    hair = cv2.resize(hair.astype(np.float32), (width, height))[: len(part), : part.shape[1]] > 0.5
+    solid = np.zeros_like(mask)
+    solid[window] = part & ~hair
+    return solid if solid.any() else mask
+
+
+def _hair(part: Mask, alpha: F32, band: float) -> Mask | None:
+    """Where `part` (h, w) of a matte `alpha` (h, w) is hair and gaps in it; None: nowhere."""
+    spot = disc(int(np.ceil(band)))
     share, whole = (
         cv2.GaussianBlur(field.astype(np.float32), (0, 0), band) for field in (part * alpha, part)
     )
@@ -297,16 +312,14 @@ def solid_part(mask: Mask, matte: Matte) -> Mask:
     is_gap = deep & (_pieces_in(pieces, alpha < 0.5) > HOLLOW * area) & (area > LEAST * band**2)
     gaps = is_gap[pieces]
     if not gaps.any():
-        return mask
+        return None
     near = dilated(gaps, int(np.ceil(BESIDE * band)))
     rest = part & ~gaps
     rest &= ~near | _opened(rest, spot)
     pieces, area = _pieces(rest)
     kept = (area >= PIECE * area.max()) | (_pieces_in(pieces, near) == 0)
     kept[0] = False
-    solid = np.zeros_like(mask)
-    solid[window] = kept[pieces]
-    return solid if solid.any() else mask
+    return part & ~kept[pieces]
 
 
 def _opened(mask: Mask, spot: U8) -> Mask:

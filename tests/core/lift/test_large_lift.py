@@ -56,8 +56,7 @@ def reduced() -> LiftedObject:
 
 
 def _take_for_large(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(masks, "LARGE", 50_000)
-    patch.setattr(masks, "ENOUGH", 200_000)
+    patch.setattr(masks, "ENOUGH", 100_000)
 
 
 def _drawn(lifted: LiftedObject, turn: tuple[float, float, float]) -> Picture3D:

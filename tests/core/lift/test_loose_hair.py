@@ -136,7 +136,6 @@ def test_in_tiles_as_on_a_large_photo_it_is_the_same(monkeypatch):
     pixels, matte = _furry()
     whole = with_loose_hair(pixels, matte)
     assert whole is not matte
-    monkeypatch.setattr(loose_hair, "LARGE", 1000)
     monkeypatch.setattr(loose_hair, "TILE", 50)
     tiled = with_loose_hair(pixels, matte)
     assert tiled.box == whole.box
@@ -151,7 +150,6 @@ def test_of_a_large_photo_no_more_is_taken_for_hair_than_of_the_smaller_one(monk
     """Lines are wider there, so that their px count for less beside an outline's length."""
     pixels, matte = _furry()
     hairy = with_loose_hair(pixels, matte)
-    monkeypatch.setattr(masks, "LARGE", 1000)
     monkeypatch.setattr(masks, "ENOUGH", WIDTH * HEIGHT // 100**2)
     assert with_loose_hair(pixels, matte) is matte is not hairy
 
