@@ -19,7 +19,7 @@ def main() -> None:
 
     lines = (HERE / "day.jsonl").read_text(encoding="utf-8").splitlines()
     told = [json.loads(line) for line in lines if line.startswith("{")]
-    samples = [Sample(**values) for values in told if "memory" in values]
+    samples = [Sample(**values) for values in told if "files" in values]
     (HERE / "day.svg").write_text(chart(samples), encoding="utf-8")
     hundreds = [Hundred(**values) for values in told if "main" in values]
     print("\n".join(problems(samples) + slower(hundreds)) or "Nothing grew.")
