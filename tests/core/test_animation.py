@@ -269,6 +269,9 @@ def test_key_poses_are_kept_changed_and_saved():
     assert count_keys(document) == 3 and is_at_key(document, 2)
     assert at_key(document, 0).objects[0].pose is None
     assert at_key(document, 1).objects[0].placement.turn == (20.0, 0.0, 0.0)
+    for key in range(3):
+        shown = at_key(document, key)
+        assert [is_at_key(shown, other) for other in range(3)] == [key == k for k in range(3)]
 
     opened = decode_session(encode_session(document))
     for one, other in zip(opened.objects[0].keys, document.objects[0].keys, strict=True):

@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.rotations import turn_matrix
-from objectmorpher_core.document.model import Document, EditObject, Handle, Placement, Pose, Prompt
+from objectmorpher_core.document.model import (
+    Document,
+    EditObject,
+    Handle,
+    Placement,
+    Pose,
+    Prompt,
+    show_the_same,
+)
+from objectmorpher_core.document.paint import HARDLY, Paint
+from objectmorpher_core.document.sides import FurtherView
 from tests import shapes
 
 F64 = 1e-9
@@ -87,6 +97,59 @@ def test_an_object_is_moved_by_pose_placement_or_hiding(document, scene):
     assert replace(item, pose=scene.puppet.deformer.rest()).is_moved
     assert replace(item, is_visible=False).is_moved
     assert not EditObject("empty", is_visible=False).is_moved
+
+
+def test_a_refinement_is_of_one_photo_plate_and_look_of_the_objects(document):
+    item = document.objects[0]
+    renamed = replace(document, objects=(replace(item, name="Cat", is_locked=True),))
+    assert show_the_same(document, renamed)
+    others = (
+        {"photo": replace(document.photo)}, {"plate": replace(document.plate)},
+        {"plate": None}, {"horizon": 20.0}, {"feather": 2.0}, {"objects": ()},
+        {"depth": np.ones((3, 4), np.float32)},
+        {"objects": (replace(item, placement=Placement(depth=1.0)),)},
+    )  # fmt: skip
+    for other in others:
+        assert not show_the_same(document, replace(document, **other)), other.keys()
+
+
+def test_paint_is_shown_on_the_gaussians_and_not_kept_in_them(document, scene):
+    count = len(scene.lifted.gaussians)
+    is_painted, apart = np.arange(count) % 2 == 0, np.arange(count) % 3 == 0
+    spots = np.where(is_painted[:, None], np.uint8([0, 255, 0, 255]), np.uint8(0))
+    item = replace(document.objects[0], matte=replace(scene.matte, paint=Paint((), spots, apart)))
+    for plain in (document.objects[0], replace(item, lifted=None)):
+        assert plain.shown is plain.lifted
+    shown, lifted = item.shown, scene.lifted
+    assert item.lifted is lifted
+    assert (shown.gaussians.colors[is_painted] == [0, 1, 0]).all()
+    for own, kept, where in (
+        (shown.gaussians.colors, lifted.gaussians.colors, ~is_painted),
+        (shown.texture.visibility, lifted.texture.visibility, ~apart),
+    ):
+        assert np.array_equal(own[where], kept[where])
+    assert shown.texture.visibility[apart].max() <= HARDLY < lifted.texture.visibility[apart].max()
+
+
+VIEW = {
+    "pose": np.eye(4), "pixels": np.zeros((5, 7, 3)), "alpha": np.zeros((5, 7)),
+    "matches": np.zeros((2, 4)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"pose": np.diag([1.0, 1.0, -1.0, 1.0])}, {"pose": np.full((4, 4), np.nan)},
+        {"pixels": np.zeros((7, 5, 3))}, {"alpha": np.zeros((5, 7, 1))}, {"alpha": np.zeros(5)},
+        {"pixels": np.zeros((0, 7, 3)), "alpha": np.zeros((0, 7))},
+        {"matches": np.zeros((2, 3))}, {"matches": np.full((2, 4), np.inf)},
+    ],
+)  # fmt: skip
+def test_a_further_photo_is_taken_where_its_parts_fit_each_other_alone(scene, part):
+    assert FurtherView("side.png", scene.camera, left=0, top=0, **VIEW).mask.shape == (5, 7)
+    with pytest.raises(ValueError, match=r"further photo|matches"):
+        FurtherView("side.png", scene.camera, left=0, top=0, **(VIEW | part))
 
 
 # ---- a lifted object ------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from objectmorpher_core.base.rotations import (
     turn_of,
     vector_from_matrix,
 )
-from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.model import LiftedObject, Placement
 from objectmorpher_core.document.placement import (
     GroundError,
     HeldPoint,
@@ -192,10 +192,22 @@ def test_a_roll_is_about_the_middle_and_leaves_the_position(scene, stands):
     )
 
 
+def _in_smaller_units(lifted: LiftedObject, times: float) -> LiftedObject:
+    """The same object in the same place, of which the frame counts so many times as many."""
+    own, world = lifted.gaussians, lifted.world_from_object.copy()
+    world[:3, :3] /= times
+    return replace(
+        lifted, gaussians=replace(own, means=own.means * times, scales=own.scales * times),
+        control_points=lifted.control_points * times, world_from_object=world,
+        spacing=lifted.spacing * times,
+    )  # fmt: skip
+
+
 @over("stands", [True, False])
-def test_a_place_is_in_place_whatever_the_rounding_of_how_it_was_computed(scene, stands):
+@over("times", [1.0, 0.01, 100.0])
+def test_a_place_is_in_place_whatever_the_rounding_of_how_it_was_computed(scene, stands, times):
     document, camera = scene.document(), scene.camera
-    lifted = replace(scene.lifted, stands=stands)
+    lifted = _in_smaller_units(replace(scene.lifted, stands=stands), times)
     thing = replace(document.objects[0], lifted=lifted)
     down = gimbal_of(thing, document).down
     for turn in ((20.0, 0.0, 0.0), (-31.0, 7.0, 3.0)):
@@ -204,9 +216,11 @@ def test_a_place_is_in_place_whatever_the_rounding_of_how_it_was_computed(scene,
             for off, is_still in ((0.0, True), (1e-9, True), (0.05, False)):
                 motion = place.matrix(lifted, camera)
                 motion[:3, :3] *= 1 + off
-                motion[:3, 3] += lifted.diameter * off
+                motion[:3, 3] += lifted.diameter * lifted.scale * off
                 computed = replace(thing, placement=placement_of(motion, lifted, camera))
                 assert is_in_place(computed, document) == is_still, (place, off)
+    aside = replace(thing, placement=Placement(move=(0.5, 0.0)))
+    assert not is_in_place(aside, document) and is_in_place(thing, document)
 
 
 UPS = [(0.0, -1.0, 0.0), (0.1, -0.6, -float(np.sqrt(1 - 0.37)))]

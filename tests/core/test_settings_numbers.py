@@ -29,6 +29,9 @@ def test_a_hint_moves_and_scales_with_its_picture(x, y, dx, dy, radius, wide, hi
     assert scaled.source == ((x + dx) * wide, (y + dy) * high)
     assert scaled.to == ((y + dx) * wide, (x + dy) * high)
     assert scaled.radius == radius * min(wide, high)
+    for none in (0.0, -radius, float("nan")):
+        with pytest.raises(ValueError, match="radius"):
+            Hint((x, y), (y, x), none)
 
 
 @given(st.floats(-3, 3), st.floats(-1, 1))
