@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csr_array
 
 from objectmorpher_core.base.arrays import F64 as Array
-from objectmorpher_core.deform.anderson import Anderson
+from objectmorpher_core.deform.anderson import WINDOW, Anderson
 from objectmorpher_core.deform.arap import ArapSolver, minimise
 from objectmorpher_core.deform.constraints import Constraints, Targets
 from objectmorpher_core.deform.graph import build_graph
@@ -232,6 +232,18 @@ def test_the_energy_never_rises(angle):
     _hold(solver, *_bent_bar(points, angle))
     energies = minimise(solver, _identity(solver), 100, tolerance=0.0).energies
     assert (np.diff(energies) <= 1e-9 * energies[0]).all()
+
+
+@pytest.mark.parametrize("size", [2, 5, WINDOW])
+def test_acceleration_solves_a_linear_iteration_in_hardly_more_steps_than_it_has_numbers(size):
+    """By itself it would need hundreds."""
+    own = np.linspace(-0.5, 0.99, size)
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(size, size)))[0]
+    history, x, goal = Anderson(size), np.zeros(size), turn.sum(0)
+    for _ in range(size + 3):
+        value = goal + turn @ (own * (turn.T @ (x - goal)))
+        x = history.mix(value, value - x)
+    assert np.abs(x - goal).max() < F64 * np.abs(goal).max()
 
 
 def test_what_frames_of_a_drag_have_learnt_makes_the_next_ones_better():

@@ -11,6 +11,7 @@ from objectmorpher_core.deform.control_points import (
     MAX_COUNT,
     MIN_COUNT,
     sample_control_points,
+    with_more_points,
 )
 from tests import shapes
 from tests.tree import over
@@ -49,6 +50,20 @@ def _plain(points: np.ndarray, count: int) -> np.ndarray:
 @over("count", [4, 150, MAX_COUNT])
 def test_the_blocks_choose_what_the_plain_loop_chooses(cloud, count):
     assert np.array_equal(_sample(cloud, count), _plain(cloud, min(count, len(cloud))))
+
+
+@clouds
+@over("share", [0.1, 0.4])
+def test_more_are_added_until_none_is_farther_than_a_gap_and_none_nearer(cloud, share):
+    kept = _sample(cloud[: len(cloud) // 3], 6)
+    gap = share * float(np.median(np.linalg.norm(cloud - cloud[0], axis=1)))
+    points = with_more_points(kept, cloud, gap)
+    rounding = F32 * np.abs(cloud).max()
+    assert np.array_equal(points[: len(kept)], kept)
+    assert cKDTree(points).query(cloud)[0].max() <= gap + rounding
+    apart = cKDTree(points).query(points[len(kept) :], k=2)[0][:, 1]
+    assert len(apart)
+    assert apart.min() >= gap - rounding
 
 
 def test_the_same_cloud_gives_the_same_points():

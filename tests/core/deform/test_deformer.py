@@ -8,7 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from objectmorpher_core.deform.deformer import ANCHORED_SHARE, Deformer
+from objectmorpher_core.deform.arap import ArapSolver, iterate
+from objectmorpher_core.deform.constraints import Constraints, Targets
+from objectmorpher_core.deform.deformer import ANCHORED_SHARE, FAITHFUL_ITERATIONS, Deformer
 from objectmorpher_core.document.model import Handle
 from objectmorpher_core.document.pose import UNHELD
 from objectmorpher_core.document.settings import DeformSettings
@@ -83,6 +85,18 @@ def test_the_paper_moves_the_control_point_by_as_much_as_the_clicked_one():
     pose = deformer.solve((fixed, moving)).pose
     moved = pose.points[moving.control_point] - deformer.points[moving.control_point]
     assert np.abs(moved - [0.1, 0.3, 0.0]).max() < F64
+
+
+def test_the_papers_pose_is_three_iterations_on_its_graph_with_no_stiffer_hands():
+    deformer = _deformer(shapes.bar(3000), settings=DeformSettings(is_faithful=True))
+    handles = (_at(deformer, (-0.5, 0, 0)), _at(deformer, (0.5, 0, 0), (0.0, 0.3, 0.1)))
+    pose = deformer.solve(handles, UNHELD).pose
+    solver = ArapSolver(deformer.points, deformer.graph.weights)
+    solver.constrain(Constraints.on_nodes(np.array([h.control_point for h in handles])))
+    targets = np.array([h.target for h in handles])
+    solver.aim(Targets(targets, np.empty((0, 3)), np.empty((0, 3, 3))))
+    papers = iterate(solver, deformer.rest().rotations, FAITHFUL_ITERATIONS)
+    assert np.abs(pose.points - papers.positions).max() < F64
 
 
 def test_laplacian_editing_turns_nothing():

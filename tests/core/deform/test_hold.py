@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.deform.binding import Binding
-from objectmorpher_core.deform.hold import GRIP, SMALLEST, Frozen, Grasp, HandleRows, Start
+from objectmorpher_core.deform.hold import GRIP, SHARED, SMALLEST, Frozen, Grasp, HandleRows, Start
 from objectmorpher_core.deform.hold import stiffened as weights_in_hand
 from objectmorpher_core.document.model import Handle
 from tests import shapes
@@ -71,3 +71,20 @@ def test_a_hand_is_stiffest_in_its_middle_and_ends_at_its_radius():
     turn = shapes.rotation(3)
     turned = weights_in_hand(points @ turn.T + 1, weights, handle + 1, handle + 1, 2.0)
     np.testing.assert_allclose(turned, data, rtol=1e-9)
+
+
+@pytest.mark.parametrize("apart", [1.0, 1.9, 2.1])
+def test_of_two_hands_each_lets_go_towards_the_other_and_both_in_the_middle(apart):
+    """`apart` x their radius: from twice that on they do not meet, and are as if alone."""
+    radius = SMALLEST * 2.0
+    places = np.array([0.0, 0.2, 0.5, 0.8, 1.0]) * apart  # x the radius, from the one
+    points, handles = np.outer(places, [radius, 0, 0]), np.outer([0, apart], [radius, 0, 0])
+    weights = csr_array(1.0 - np.eye(5))
+    data = weights_in_hand(points, weights, handles, handles, 2.0)
+    grips = [np.maximum(1 - gaps**2, 0) ** 2 for gaps in (places, places[::-1])]
+    if apart < 2:
+        grips[0] *= ((apart - 2 * places) / (SHARED * apart)).clip(0, 1)
+        grips[1] = grips[0][::-1]
+    times = 1 + (GRIP - 1) * np.maximum(*(np.outer(grip, grip) for grip in grips))
+    dense = csr_array((data, weights.indices, weights.indptr)).toarray()
+    np.testing.assert_allclose(dense, weights.toarray() * times, **EXACT)

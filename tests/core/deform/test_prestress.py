@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import null_space
@@ -81,3 +82,13 @@ def test_a_pose_that_is_strained_wholly_has_no_energy():
     pose = rng.normal(size=(COUNT, 3)), shapes.rotations(COUNT)
     strained = links.prestressed(full_prestress(links, pose))
     assert strained.energies(*pose).max() < F64_SUM < links.energies(*pose).min()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_energy_of_strained_links_is_the_sum_of_the_control_points_shares(seed):
+    rng = np.random.default_rng(seed)
+    links = _links(rng)
+    pose = rng.normal(size=(COUNT, 3)), shapes.rotations(COUNT, seed)
+    for strained in (links, links.prestressed(rng.normal(size=(links.weights.nnz, 3)))):
+        _, energy = strained.fit(*pose, np.ones(COUNT, bool))
+        assert energy == pytest.approx(strained.energies(*pose).sum(), rel=F64_SUM)

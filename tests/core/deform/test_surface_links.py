@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.graph import LINK_RADIUS, ControlGraph, SolidSurface, build_graph
+from objectmorpher_core.deform.surface_links import HIT, thickness
 from objectmorpher_core.document.settings import DeformSettings
 from objectmorpher_research.bench.bodies import five_limbs
 from tests import shapes
@@ -218,6 +219,18 @@ def test_the_papers_graph_knows_no_surface(name):
     scene, points = _scene(name)
     weights = build_graph(points, FAITHFUL, scene.surface).weights
     assert (weights != build_graph(points, FAITHFUL).weights).nnz == 0
+
+
+@pytest.mark.parametrize("share", [0.1, 0.6, 1.0, 2.4, 5.2])
+def test_how_thick_a_body_is_is_told_to_a_spacing_however_thin(share):
+    """And nothing is told of what no other side is met behind."""
+    spacing = 1 / 13
+    points = shapes.two_sheets(share * spacing)
+    up = np.repeat([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], len(points) // 2, axis=0)
+    told = thickness(points, up, spacing, 6 * spacing, SolidSurface(points, up)) / spacing
+    assert np.abs(told - share).max() <= HIT and told.min() > 0
+    alone = points[: len(points) // 2], up[: len(points) // 2]
+    assert not thickness(*alone, spacing, 6 * spacing, SolidSurface(*alone)).any()
 
 
 def _kept(surface: SolidSurface, count: int = 512) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import tiles
-from objectmorpher_core.raster.picking import LEAST_ALPHA, pick
+from objectmorpher_core.raster.picking import LEAST_ALPHA, SLACK, pick, seen_points
 from tests import shapes
 
 DEPTH = 1e-5  # world units, of a depth of about 3
@@ -87,6 +87,19 @@ def test_behind_a_faint_layer_the_greater_part_is_picked():
     hit = pick(tiles.prepare(solid, shapes.camera(), shapes.camera()), texture, (80.5, 60.5))
     assert hit is not None
     assert hit.depth == pytest.approx(depths[0], abs=0.02)
+
+
+def test_a_point_is_seen_that_faces_the_camera_and_has_nothing_of_the_object_before_it():
+    """On the front disc and close behind it; on the disc behind; beside both; facing away."""
+    splats, texture, (front, back) = shapes.two_discs(front_opacity=1.0)
+    camera, slack = shapes.camera(), SLACK * splats.rest.lifted.diameter
+    depths = np.array([front, front + 0.5 * slack, front + 2 * slack, back, back, front])
+    points = np.outer(depths, [0.01, 0.01, 1.0])
+    points[4, :2] = 1.2, -0.8
+    normals = np.tile([0.0, 0.0, -1.0], (6, 1))
+    normals[5] *= -1
+    seen = seen_points(splats, texture, camera, points, normals)
+    assert seen.tolist() == [True, True, False, False, True, False]
 
 
 def test_where_nothing_is_drawn_nothing_is_picked(scene):

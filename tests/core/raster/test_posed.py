@@ -61,6 +61,20 @@ def test_depths_that_are_one_surface_grow_with_the_object(scene):
     rest, large = (scene.puppet.posed(None, p) for p in (Placement(), Placement(scale=3.0)))
     assert large.gap == pytest.approx(3 * rest.gap)
     assert large.texture_gap == rest.texture_gap, "in px of the photo"
+    fine = RestSplats(scene.lifted, shapes.camera(2 * shapes.WIDTH, 2 * shapes.HEIGHT))
+    finer = PosedSplats(fine, None, np.eye(4))
+    assert finer.texture_gap == pytest.approx(2 * rest.texture_gap), "and of a finer one, more px"
+
+
+def test_what_faces_away_shows_the_colours_of_its_mirror_image_that_does_not():
+    rest = shapes.random_splats(0)[0].rest
+    ways = rest.lifted.world_points(rest.means)
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    own, shown = ((normals * ways).sum(1) for normals in (rest.normals, rest.shown_normals))
+    assert own.min() < -0.5 and own.max() > 0.5
+    assert np.abs(shown + np.abs(own)).max() < F64
+    across = rest.normals - own[:, None] * ways
+    assert np.abs(rest.shown_normals - shown[:, None] * ways - across).max() < F64
 
 
 def test_deforming_in_the_object_frame_is_deforming_in_the_world(scene):

@@ -45,6 +45,17 @@ def test_a_linear_ramp_is_sampled_exactly_between_pixels():
     assert np.abs(values[:, 0] - (x - 0.5) / 55).max() < F32
 
 
+@pytest.mark.parametrize("splatting", ["mip", "classic"])
+def test_an_opaque_gaussian_of_a_trained_cloud_lets_a_hundredth_through(splatting):
+    splats, texture, _ = shapes.two_discs(front_opacity=1.0)
+    lifted = replace(splats.rest.lifted, splatting=splatting)
+    lifted = replace(lifted, gaussians=replace(lifted.gaussians, colors=np.eye(2, 3)))
+    camera = shapes.camera()
+    splats = replace(splats, rest=RestSplats(lifted, camera))
+    middle = reference.render(splats, texture, camera, camera).color[60, 80]
+    assert np.abs(middle - [0.99, 0.01 * 0.99, 0.0]).max() < F32
+
+
 def test_outside_the_crop_there_is_no_alpha_but_still_a_colour():
     texture = _texture()
     values = sample_texture(texture, np.array([[-50.0, -50.0], [500.0, 10.0]]), np.zeros(2))
