@@ -14,6 +14,7 @@ from objectmorpher_core.compose.order import back_to_front, leaves_a_hole, reord
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.paint import SIDE, Paint, PaintTile
 from objectmorpher_core.raster.posed import PosedSplats
 from tests import shapes
 
@@ -67,6 +68,22 @@ def test_an_object_at_rest_covers_what_moves_behind_it():
         "what moved is seen beside it"
     )
     assert result.outside_footprint_changed == 0
+
+
+@pytest.mark.parametrize("is_painted", [False, True])
+def test_behind_the_edge_of_an_object_at_rest_all_shares_sum_to_one(is_painted: bool):
+    document = _two_discs()
+    left, lifted = document.objects[0], document.objects[0].lifted
+    assert left.matte is not None and lifted is not None
+    green = PaintTile(0, 0, np.full((SIDE, SIDE, 4), (0, 255, 0, 255)))
+    paint = Paint((green,), np.zeros((len(lifted.gaussians), 4))) if is_painted else None
+    painted = replace(left, matte=replace(left.matte, paint=paint))
+    document = replace(document, objects=(painted, document.objects[1]))
+    result = composite(_moved(document, 0, Placement(move=(ACROSS, 0.0), depth=1.0)))
+    assert [thing.item.is_moved for thing in result.stack] == [True, False]
+    shares = vars(result.shares)
+    assert sum(shares.values()) == pytest.approx(1, abs=1e-6)
+    assert min(shares.values()) >= 0 and (shares["from_paint"] > 0.1) == is_painted
 
 
 def test_what_moves_in_front_of_an_object_at_rest_covers_it():

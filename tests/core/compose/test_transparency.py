@@ -133,6 +133,9 @@ def test_no_black_comes_into_a_soft_edge(kind: str):
     soft = (result.alpha > 0.1 * top) & (result.alpha < 0.9 * top)
     assert soft.sum() > 100
     assert result.pixels[soft].min() > 0.9 * top
+    is_recoloured, is_other = (result.pixels != light).any(-1), result.alpha != alpha
+    assert (is_other & ~is_recoloured).sum() > 100
+    assert result.changed == (is_other | is_recoloured).sum()
 
 
 @kinds

@@ -99,7 +99,11 @@ def test_fewer_gaussians_cover_the_same(name: str) -> None:
     kept = is_solid[chosen].sum()
     assert 300 < kept < 1000
     assert (~is_solid).sum() == (~is_solid[chosen]).sum()  # the soft edge is whole
-    assert lifted.spacing > 2 * scene.lifted.spacing
+    gain = np.sqrt(is_solid.sum() / kept)  # along the surface, so that their areas sum to as much
+    times = lifted.gaussians.scales / scene.lifted.gaussians.scales[chosen]
+    wider = np.where(is_solid[chosen, None], [gain, gain, 1.0], 1.0)
+    assert np.abs(times - wider).max() < 1e-5 * gain
+    assert lifted.spacing == pytest.approx(gain * scene.lifted.spacing) and gain > 2
     pictures = []
     for each in (scene.lifted, lifted):
         splats = Puppet(each, DeformSettings(), scene.camera).posed(None, Placement())
