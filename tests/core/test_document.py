@@ -116,7 +116,7 @@ def test_a_refinement_is_of_one_photo_plate_and_look_of_the_objects(document):
 def test_paint_is_shown_on_the_gaussians_and_not_kept_in_them(document, scene):
     count = len(scene.lifted.gaussians)
     is_painted, apart = np.arange(count) % 2 == 0, np.arange(count) % 3 == 0
-    spots = np.where(is_painted[:, None], np.uint8([0, 255, 0, 255]), np.uint8(0))
+    spots = np.where(is_painted[:, None], np.array([0, 255, 0, 255]), 0)
     item = replace(document.objects[0], matte=replace(scene.matte, paint=Paint((), spots, apart)))
     for plain in (document.objects[0], replace(item, lifted=None)):
         assert plain.shown is plain.lifted

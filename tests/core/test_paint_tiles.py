@@ -21,7 +21,11 @@ def test_what_is_laid_on_is_there_and_nothing_else(seed):
     strokes = np.hstack([places, rng.integers(1, 61, (4, 2))]).tolist()
     paint = Paint((), np.zeros((0, 4), np.uint8))
     whole = np.zeros((WHOLE, WHOLE, 4), np.uint8)
-    for x, y, width, height in [*strokes, (-20, SIDE - 20, 45, 40)]:  # over a corner of tiles
+    corner = (
+        (-20, SIDE - 20, 45, 40),
+        (0, SIDE - 30, 20, 30),
+    )  # over a corner of tiles, and up to it
+    for x, y, width, height in [*strokes, *corner]:
         rgba = rng.integers(0, 256, (height, width, 4)).astype(np.uint8)
         rgba[..., 3] |= 1
         paint = paint.with_pixels((x, y, x + width, y + height), rgba)

@@ -337,6 +337,16 @@ def test_of_a_texture_by_rows_only_what_is_looked_at_takes_memory(monkeypatch):
     assert np.array_equal(part, whole[first : first + 32])
 
 
+def test_a_texture_is_there_by_rows_from_its_area_on(monkeypatch):
+    scene = _wide()
+    shown = tiles.prepare(scene.puppet.posed(None, Placement()), scene.camera, scene.camera)
+    height, width = texture_source(scene.matte, scene.lifted).shape
+    for most, is_by_rows in ((height * width - 1, True), (height * width, False)):
+        monkeypatch.setattr(composite_module, "LARGE", most)
+        carried = composite_module._Carried(scene.matte, scene.lifted, shown)
+        assert isinstance(carried._texture, TextureRows) == is_by_rows
+
+
 def test_every_strip_tells_how_far_it_is(monkeypatch):
     monkeypatch.setattr(composite_module, "STRIP", 640 * 32)
     told: list[float] = []

@@ -76,7 +76,7 @@ def test_behind_the_edge_of_an_object_at_rest_all_shares_sum_to_one(is_painted: 
     left, lifted = document.objects[0], document.objects[0].lifted
     assert left.matte is not None and lifted is not None
     green = PaintTile(0, 0, np.full((SIDE, SIDE, 4), (0, 255, 0, 255)))
-    paint = Paint((green,), np.zeros((len(lifted.gaussians), 4))) if is_painted else None
+    paint = Paint((green,), np.zeros((len(lifted.gaussians), 4), np.uint8)) if is_painted else None
     painted = replace(left, matte=replace(left.matte, paint=paint))
     document = replace(document, objects=(painted, document.objects[1]))
     result = composite(_moved(document, 0, Placement(move=(ACROSS, 0.0), depth=1.0)))
