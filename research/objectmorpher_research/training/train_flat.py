@@ -23,6 +23,7 @@ TAKES = 3
 BETWEEN = (flatness.FLAT, "sheets")  # families whose members are not all solid
 SOLIDS = tuple(name for name in FAMILIES if name not in BETWEEN)
 KINDS = ((flatness.FLAT,), (flatness.ROUND,), SOLIDS)  # of the things
+NAMES = ("prints", "round things with such pictures", "other solids")
 SHARES = (13, 8, 13)  # of each kind
 FIRST = 45  # seed of the first kind's
 CHECKED = 12  # seed of the first kind's, counted from UNSEEN, on which nothing was trained
@@ -40,22 +41,33 @@ def train_flat(
     folder: Path, things: int, start: Path, output: Path, progress: Progress = silent
 ) -> dict[str, Any]:
     """Train on so many `things` from the weights `start`, and write `output`; what came of it."""
-    files, unseen = [], []
-    for k, own in enumerate(sets(things)):
-        first = UNSEEN + (CHECKED + k) * APART
-        unseen += write_shards(
-            folder / "unseen", first, max(own.samples // 3, 1), progress, own.families
-        )
-        first = own.seed * APART
-        files += write_shards(folder / "samples", first, own.samples, progress, own.families, TAKES)
+    files: list[Path] = []
+    unseen: dict[str, list[Path]] = {}
+    for k, (name, own) in enumerate(zip(NAMES, sets(things), strict=True)):
+        count, first = max(own.samples // 3, 1), UNSEEN + (CHECKED + k) * APART
+        unseen[name] = write_shards(folder / "unseen", first, count, progress, own.families)
+        count, first = own.samples, own.seed * APART
+        files += write_shards(folder / "samples", first, count, progress, own.families, TAKES)
     net = ShapeNet()
     net.load_state_dict(weights_of(start, net))
     net.eval()
-    learned, checked = flatness.samples_of(files, progress), flatness.samples_of(unseen, progress)
-    before = flatness.found(net.flat, checked, FLAT)
+    learned = flatness.samples_of(files, progress)
+    checked = {name: flatness.samples_of(own, progress) for name, own in unseen.items()}
+    before = {name: _taken(net, own) for name, own in checked.items()}
     flatness.tune(net.flat, learned)
     return {
         "flat": int(learned.is_flat.sum()), "solid": int((1 - learned.is_flat).sum()),
-        "before": before, "after": flatness.found(net.flat, checked, FLAT),
+        "found": {
+            name: {
+                "things": len(own.is_flat), "before": before[name], "after": _taken(net, own),
+            }
+            for name, own in checked.items()
+        },
         "sha256": export_flatness(net, start, output),
     }  # fmt: skip
+
+
+def _taken(net: ShapeNet, samples: flatness.FlatSamples) -> int:
+    """How many are taken for flat."""
+    found = flatness.found(net.flat, samples, FLAT)
+    return found["found"] + found["mistaken"]

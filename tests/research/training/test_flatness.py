@@ -139,6 +139,7 @@ def test_one_command_trains_it_further_and_leaves_the_surfaces(networks, tmp_pat
     weights = (tmp_path / "shape.onnx").read_bytes()
     assert told["sha256"] == hashlib.sha256(weights).hexdigest()
     assert told["flat"] == 6 and 6 <= told["solid"] <= 12  # of each thing three photos
+    assert told["found"]["prints"]["things"] == 2
     sample = make_sample(90_000_000, families=("prints",))
     crop = Crop(0, 0, SIDE, sample.tangents)
     before, after = (
