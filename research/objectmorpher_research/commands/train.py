@@ -27,6 +27,9 @@ def add_train(parser: argparse.ArgumentParser) -> None:
             "shape", "the shape network, on endless made-up objects", _add_shape, _train_shape
         ),
         Subcommand(
+            "flat", "what the shape network says of flatness, by itself", _add_flat, _train_flat
+        ),
+        Subcommand(
             "shadow", "the network that finds shadows, on endless made-up scenes", _add_shadow,
             _train_shadow,
         ),
@@ -55,6 +58,17 @@ def _add_shape(parser: argparse.ArgumentParser) -> None:
         help="N samples of another seed as well, of these families only")  # fmt: skip
     _add_run(parser, "shape.onnx")
     add("--report", type=Path, metavar="F.json", help="figures; default: beside the weights")
+
+
+def _add_flat(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Trains whether a thing is flat further, on made-up things. The surfaces stay as they are."
+    )
+    add = parser.add_argument
+    add("--things", type=int, default=1100, metavar="N", help="to make, default 1100")
+    add("--start", type=Path, metavar="ONNX", help="exported weights; default: those that ship")
+    add("--folder", type=Path, required=True, metavar="DIR", help="what it is trained on")
+    add("-o", "--output", type=Path, metavar="F.onnx", help="default: shape.onnx in the folder")
 
 
 def _add_shadow(parser: argparse.ArgumentParser) -> None:
@@ -348,6 +362,26 @@ def _train_shape(options: argparse.Namespace) -> None:
     weights = options.output or options.folder / "shape.onnx"
     found["sha256"] = export(net, weights)
     report = options.report or weights.with_suffix(".json")
+    write_all({report: json.dumps(found, indent=1).encode()})
+    print(f"{weights}, figures in {report}")
+
+
+def _train_flat(options: argparse.Namespace) -> None:
+    """Makes samples, trains, and writes weights and figures."""
+    _check_installed()
+    from objectmorpher_core.models import registry
+
+    from ..training.train_flat import train_flat
+
+    start = options.start or Path(registry.__file__).with_name("shape.onnx")
+    if not start.is_file():
+        raise UsageError(f"there is no file {start}")
+    if options.things < 3:
+        raise UsageError("--things: at least 3, one of each kind")
+    weights = options.output or options.folder / "shape.onnx"
+    with progress_bar("what is flat") as progress:
+        found = train_flat(options.folder, options.things, start, weights, progress)
+    report = weights.with_suffix(".json")
     write_all({report: json.dumps(found, indent=1).encode()})
     print(f"{weights}, figures in {report}")
 

@@ -39,6 +39,24 @@ def export(net: ShapeNet, path: Path) -> str:
     return write_onnx(whole, inputs, path, INPUTS, OUTPUTS)
 
 
+def export_flatness(net: ShapeNet, old: Path, path: Path) -> str:
+    """Write `path`: what is flat as `net` says it, and the surfaces of the file `old`; its SHA-256.
+
+    The weights of the surfaces are carried over as they are, so that they see the very same.
+    """
+    import onnx
+
+    export(net, path)
+    model = onnx.load(path)
+    kept = {weight.name: weight for weight in onnx.load(old).graph.initializer}
+    for weight in model.graph.initializer:
+        if not weight.name.startswith(FLAT):
+            weight.CopyFrom(kept[weight.name])
+    data = model.SerializeToString()
+    path.write_bytes(data)
+    return hashlib.sha256(data).hexdigest()
+
+
 class _Whole(ShapeNet):
     """With the log odds (n,) that the object is flat beside the surfaces."""
 

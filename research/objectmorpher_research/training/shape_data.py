@@ -6,7 +6,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from objectmorpher_core.base.arrays import Mask
 from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.lift.crop import planes_of
 
-from .shapes.sample import Sample, make_sample
+from .shapes.sample import Sample, make_sample, make_takes
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -72,20 +72,26 @@ def write_arrays(file: Path, arrays: dict[str, np.ndarray]) -> None:
 
 def write_shards(
     folder: Path, first: int, count: int, progress: Progress = silent,
-    families: tuple[str, ...] | None = None,
+    families: tuple[str, ...] | None = None, takes: int = 1,
 ) -> list[Path]:  # fmt: skip
-    """Files of samples with the seeds first..; `families`: the only ones drawn."""
+    """Files of samples with the seeds first..; `families`: the only ones drawn.
+
+    With several `takes` there are so many of each thing (`make_takes`), their masks slightly wrong.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     jobs = [
-        (folder / f"{seed:08d}.npz", range(seed, seed + SHARD), families)
+        (folder / f"{seed:08d}.npz", range(seed, seed + SHARD), families, takes)
         for seed in range(first, first + count, SHARD)
     ]
     return make_files(_write, jobs, (SHARD, "samples"), progress)
 
 
-def _write(job: tuple[Path, range, tuple[str, ...] | None]) -> None:
-    file, seeds, families = job
-    samples = [make_sample(seed, families=families) for seed in seeds]
+def _write(job: tuple[Path, range, tuple[str, ...] | None, int]) -> None:
+    file, seeds, families, takes = job
+    if takes == 1:
+        samples = [make_sample(seed, families=families) for seed in seeds]
+    else:
+        samples = [_worn_of(one) for s in seeds for one in make_takes(s, takes, families=families)]
     arrays = packed(samples)
     rgb = np.stack([s.rgb for s in samples])
     arrays["tokens"], arrays[MIRRORED] = _tokens(rgb), _tokens(rgb[:, :, ::-1])
@@ -178,6 +184,12 @@ def batch_of(arrays: dict[str, np.ndarray], rng: np.random.Generator | None = No
         torch.from_numpy(np.ascontiguousarray(normal)), torch.from_numpy(ways),
         torch.from_numpy(away.astype(np.float32))[:, None, None, None],
     )  # fmt: skip
+
+
+def _worn_of(sample: Sample) -> Sample:
+    """The sample as a click selects it."""
+    rng = np.random.default_rng(int(sample.mask.sum()))
+    return replace(sample, mask=_worn(sample.mask, rng))
 
 
 def _worn(mask: Mask, rng: np.random.Generator) -> Mask:

@@ -8,11 +8,12 @@ import pytest
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_research.training.shapes import materials
 from objectmorpher_research.training.shapes.distance import distance, lowest, trace
-from objectmorpher_research.training.shapes.families import FAMILIES
+from objectmorpher_research.training.shapes.families import FAMILIES, FURTHER
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
 from objectmorpher_research.training.shapes.solid import THINNEST, PrimitiveBuilder, Solid, turned
 from tests.tree import over
 
+ALL = FAMILIES | FURTHER
 SIDE = 56  # px of samples here
 SEEDS = range(4)
 CLOSE = 2e-3  # of distances along rays
@@ -20,10 +21,10 @@ CLOSE = 2e-3  # of distances along rays
 
 @pytest.fixture(scope="module")
 def samples() -> dict[str, list[Sample]]:
-    return {name: [make_sample(s, SIDE, (name,)) for s in SEEDS] for name in FAMILIES}
+    return {name: [make_sample(s, SIDE, (name,)) for s in SEEDS] for name in ALL}
 
 
-@over("name", FAMILIES)
+@over("name", ALL)
 def test_one_seed_makes_one_sample(name: str, samples: dict[str, list[Sample]]) -> None:
     again = make_sample(3, SIDE, (name,))
     for field in ("rgb", "mask", "front", "thickness", "depth", "normal", "edge", "part"):
@@ -31,7 +32,7 @@ def test_one_seed_makes_one_sample(name: str, samples: dict[str, list[Sample]]) 
     assert (samples[name][2].rgb != samples[name][3].rgb).any()
 
 
-@over("name", FAMILIES)
+@over("name", ALL)
 def test_the_object_is_seen_and_measured(name: str, samples: dict[str, list[Sample]]) -> None:
     for seed, sample in zip(SEEDS, samples[name], strict=True):
         mask = sample.mask
@@ -49,7 +50,7 @@ def test_the_object_is_seen_and_measured(name: str, samples: dict[str, list[Samp
         assert ((sample.normal * rays).sum(-1)[mask] < 1e-3).all()  # towards the camera
 
 
-@over("name", FAMILIES)
+@over("name", ALL)
 def test_normals_are_those_of_the_front(name: str, samples: dict[str, list[Sample]]) -> None:
     angles = np.concatenate([_angles(sample) for sample in samples[name]])
     assert len(angles) > 50
@@ -181,11 +182,11 @@ def _without_balls(solid: Solid) -> Solid:
     return solid._replace(bounds=bounds, balls=balls)
 
 
-@over("name", FAMILIES)
+@over("name", ALL)
 def test_balls_hold_their_parts(name: str) -> None:
     for seed in range(8):
         rng = np.random.default_rng([seed, 5])
-        solid = FAMILIES[name](rng).finish()
+        solid = ALL[name](rng).finish()
         assert np.linalg.norm(solid.bounds[:, :3], axis=1).max() < 1.1
         slow = _without_balls(solid)
         for part, bound in enumerate(solid.bounds):
@@ -195,12 +196,12 @@ def test_balls_hold_their_parts(name: str) -> None:
                 assert distance(*place, alone, False)[0] > 0
 
 
-@over("name", FAMILIES)
+@over("name", ALL)
 def test_balls_only_save_time(name: str) -> None:
     """What they let pass by would have changed nothing, nor may a ray step over a surface."""
     for seed in range(4):
         rng = np.random.default_rng([seed, 6])
-        solid = FAMILIES[name](rng).finish()
+        solid = ALL[name](rng).finish()
         slow = _without_balls(solid)
         for place in rng.uniform(-1, 1, (60, 3)):
             quick, whole = (distance(*place, s, False)[0] for s in (solid, slow))

@@ -6,7 +6,7 @@ Its units are those of `lift.crop`, in which the network sees a photo.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -18,8 +18,8 @@ from objectmorpher_core.base.masks import box_of
 from objectmorpher_core.lift.crop import SIDE
 
 from .distance import lowest, trace
-from .families import FAMILIES
-from .families.prints import REACH
+from .families import FAMILIES, FURTHER
+from .families.prints import REACH, repainted
 from .materials import Material, a_colour, a_crop, a_material, a_print, albedo, grain, noise_block
 from .solid import PrimitiveBuilder, Solid, turned
 
@@ -31,6 +31,7 @@ SHARES = (0.2, 0.95)  # crop's side over the photo's
 NEAREST = 1.25  # radii of the ball, from the camera to its middle
 LEAST = 0.04  # x crop's area, that an object covers at least
 CUT = 0.18  # how often the photo's frame cuts the object
+CUT_AGAIN = 0.25  # how often it does on top where the object is photographed again
 JUMP = 0.035  # crop units between neighbouring pixels, beyond what their slopes explain
 PART_JUMP = 0.014  # likewise where another part begins: an arm that lies on a body
 NO_GROUND = -99.0
@@ -74,40 +75,84 @@ class _Scene(NamedTuple):
 
 def make_sample(seed: int, side: int = SIDE, families: tuple[str, ...] | None = None) -> Sample:
     """Make the sample of these numbers; `families` are the names of those to choose from."""
+    return make_takes(seed, 1, side, families)[0]
+
+
+def make_takes(
+    seed: int, count: int, side: int = SIDE, families: tuple[str, ...] | None = None
+) -> list[Sample]:
+    """Make `count` samples of one thing as it stands, in other colours before other backdrops.
+
+    The first has its own picture, if any, the others may have another; and more of them are cut.
+    """
     for attempt in range(50):
         rng = np.random.default_rng([seed, attempt])
         names = families or tuple(FAMILIES)
         name = names[rng.integers(len(names))]
-        found = _try(rng, name, side)
-        if found is not None:
-            return found
+        stage = _Stage.of(rng, name, side)
+        if stage is not None:
+            first = stage.photographed(rng, stage.built)
+            return [first, *(_taken_again(rng, stage) for _ in range(count - 1))]
     raise ValueError(f"no object of {families} can be seen with the seed {seed}")
 
 
-def _try(rng: np.random.Generator, name: str, side: int) -> Sample | None:
-    """None where the object is hardly seen."""
-    built = FAMILIES[name](rng)
-    if not built.prints and rng.random() < 0.12:
-        built.twist = float(np.clip(rng.normal(0, 0.5), -TWISTED, TWISTED))
-    if not built.prints and rng.random() < 0.1:
-        built.bend = float(np.clip(rng.normal(0, 0.25), -BENT, BENT))
-    solid = built.finish()
-    faced = FACED_PRINT if built.prints else FACED
-    eye = _aim(rng, partial(_any_turn, faced=faced))
-    ground = lowest(solid, COLUMNS) if eye.axes[2, 1] < -0.05 and rng.random() < 0.75 else NO_GROUND
-    eye = _framed(rng, solid, eye)
-    if eye is None:
-        return None
-    rays, lengths = _rays(eye, side)
-    lamps = _lamps(rng, eye)
-    out = np.zeros((side * side, 16))
-    trace(rays, eye.at, solid, lamps, ground, 0, side * side, out)
-    mask = (out[:, 0] > 0).reshape(side, side)
-    if mask.mean() < LEAST:
-        return None
-    scene = _Scene(solid, _materials(rng, built), ground)
-    picture = _picture(rng, scene, eye, rays, lamps, out, side)
-    return _measured(rng, name, eye, out, lengths, mask, picture)
+def _taken_again(rng: np.random.Generator, stage: _Stage) -> Sample:
+    painted = {
+        part: (repainted(rng, picture), turn)
+        for part, (picture, turn) in stage.built.prints.items()
+    }
+    sample = stage.photographed(rng, replace(stage.built, prints=painted))
+    if rng.random() >= CUT_AGAIN:
+        return sample
+    rgb, mask = _cut(rng, sample.rgb, sample.mask)
+    return replace(sample, rgb=rgb, mask=mask)
+
+
+class _Stage(NamedTuple):
+    """An object before a camera, and what its rays meet."""
+
+    name: str
+    built: PrimitiveBuilder
+    solid: Solid
+    ground: float
+    eye: _Eye
+    rays: F64  # (n, 3)
+    lengths: F64  # (n,)
+    lamps: F64  # (3, 3)
+    met: F64  # (n, 16): see `trace`
+    mask: Mask  # (s, s)
+
+    @staticmethod
+    def of(rng: np.random.Generator, name: str, side: int) -> _Stage | None:
+        """None where the object is hardly seen."""
+        built = (FAMILIES | FURTHER)[name](rng)
+        if not built.prints and rng.random() < 0.12:
+            built.twist = float(np.clip(rng.normal(0, 0.5), -TWISTED, TWISTED))
+        if not built.prints and rng.random() < 0.1:
+            built.bend = float(np.clip(rng.normal(0, 0.25), -BENT, BENT))
+        solid = built.finish()
+        faced = FACED_PRINT if built.prints else FACED
+        eye = _aim(rng, partial(_any_turn, faced=faced))
+        is_over_ground = eye.axes[2, 1] < -0.05 and rng.random() < 0.75
+        ground = lowest(solid, COLUMNS) if is_over_ground else NO_GROUND
+        eye = _framed(rng, solid, eye)
+        if eye is None:
+            return None
+        rays, lengths = _rays(eye, side)
+        lamps = _lamps(rng, eye)
+        met = np.zeros((side * side, 16))
+        trace(rays, eye.at, solid, lamps, ground, 0, side * side, met)
+        mask = (met[:, 0] > 0).reshape(side, side)
+        if mask.mean() < LEAST:
+            return None
+        return _Stage(name, built, solid, ground, eye, rays, lengths, lamps, met, mask)
+
+    def photographed(self, rng: np.random.Generator, built: PrimitiveBuilder) -> Sample:
+        """`built` may have other pictures on it than the stage's own."""
+        scene = _Scene(self.solid, _materials(rng, built), self.ground)
+        side = len(self.mask)
+        picture = _picture(rng, scene, self.eye, self.rays, self.lamps, self.met, side)
+        return _measured(rng, self.name, self.eye, self.met, self.lengths, self.mask, picture)
 
 
 def _aim(rng: np.random.Generator, turn: Callable[[np.random.Generator], F64]) -> _Eye:

@@ -14,6 +14,7 @@ from .extrusions import extrusions
 from .figures import figures
 from .furniture import furniture
 from .lumps import superquadrics
+from .padded import padded
 from .plants import plants
 from .prints import prints
 from .rings import rings
@@ -39,3 +40,5 @@ FAMILIES: dict[str, Family] = {
     "extrusions": extrusions,
     "prints": prints,
 }
+# What is drawn only where it is asked for by name
+FURTHER: dict[str, Family] = {"padded": padded}

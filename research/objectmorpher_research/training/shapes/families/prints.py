@@ -21,9 +21,7 @@ SUPER = 3  # binary digits of a px, of what is drawn
 
 def prints(rng: Rng) -> PrimitiveBuilder:
     """Make a flat thing: hanging, standing, leaning or lying, mostly plane."""
-    kinds = (_sign, _sign, _drawing, _drawing, _wings, _wings, _leaf, _leaf, _coin, _card, _cut_out,
-             _sticker)  # fmt: skip
-    drawn = pick(rng, kinds)(rng)
+    drawn = a_drawing(rng)
     lean = pick(rng, (0.0, 0.0, -span(rng, 0, 0.6), -np.pi / 2))
     turn = turned(rng.normal(0, 0.2), lean) @ turned(0, 0, rng.normal(0, 0.3))
     half = float(np.exp(span(rng, np.log(0.008), np.log(0.04))))
@@ -39,12 +37,35 @@ def prints(rng: Rng) -> PrimitiveBuilder:
     return built
 
 
+def repainted(rng: Rng, picture: F32) -> F32:
+    """A picture (h, w, 3) in other colours, faded, as it was, or a photograph in its place."""
+    kind = int(rng.integers(4))
+    if kind == 0:
+        gain = np.exp(rng.normal(0, 0.3, 3)).astype(np.float32)
+        return np.ascontiguousarray(picture[..., rng.permutation(3)] * gain).clip(0, 1)
+    if kind == 1:
+        ground = a_colour(rng).astype(np.float32)
+        faint = np.float32(rng.uniform(0, 0.25)) * (picture - picture.mean())
+        return (ground * (1 + faint)).clip(0, 1)
+    if kind == 2:
+        size = picture.shape[1::-1]
+        return np.asarray(cv2.resize(a_crop(rng), size, interpolation=cv2.INTER_AREA), np.float32)
+    return picture
+
+
 @dataclass(frozen=True, eq=False)
 class _Drawn:
     """An outline and what is painted in it."""
 
     outline: F64  # (k, 2) within 1 of the middle, y up
     picture: F32  # (SIDE, SIDE, 3) linear, over [-REACH, REACH] both ways, y down
+
+
+def a_drawing(rng: Rng) -> _Drawn:
+    """Draw any flat thing."""
+    kinds = (_sign, _sign, _drawing, _drawing, _wings, _wings, _leaf, _leaf, _coin, _card, _cut_out,
+             _sticker)  # fmt: skip
+    return pick(rng, kinds)(rng)
 
 
 class _Canvas:
