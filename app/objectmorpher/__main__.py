@@ -8,7 +8,6 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
@@ -26,20 +25,13 @@ HEADLESS_OUT = Path("objectmorpher-edited.png")
 # Most objects are the modules' own, and stay; to look for garbage among them takes .1 s each time.
 GARBAGE = 50_000, 20, 20  # new objects, and how often younger ones are looked through before older
 FINAL = ("edit", "select", "replay")  # commands that have written everything when they return
-LOOKING = ("edit", "select")  # commands that look at a photo by a network
 
 
 def run() -> NoReturn:
     """Runs the program as a process of its own, and ends it."""
     gc.set_threshold(*GARBAGE)
-    is_final = sys.argv[1:2] and sys.argv[1] in FINAL
-    try:
-        code = main()
-    except SystemExit as end:  # of wrong arguments: a network may be opened meanwhile
-        if not is_final or not isinstance(end.code, int):
-            raise
-        code = end.code
-    if is_final:
+    code = main()
+    if sys.argv[1:2] and sys.argv[1] in FINAL:
         _leave(code)
     sys.exit(code)
 
@@ -92,18 +84,7 @@ def _run_command(arguments: Sequence[str]) -> int:
         if (code := run_command(arguments)) is not None:
             return code
     _start_log()
-    if arguments[0] in LOOKING:
-        Thread(target=_open_network, daemon=True).start()
     return cli.main(arguments)
-
-
-def _open_network() -> None:
-    """Beside the imports of everything else; without its weights, whoever needs it says so."""
-    from objectmorpher_core.models import ModelError
-    from objectmorpher_core.segment.dino_tokens import shared
-
-    with suppress(ModelError):
-        shared()
 
 
 def _start_log() -> None:
