@@ -43,7 +43,7 @@ def test_what_becomes_slower_is_told() -> None:
 
 
 @pytest.mark.parametrize("name", ["memory", "textures", "buffers"])
-def test_what_the_same_edits_leave_behind_is_told(name: str) -> None:
+def test_what_the_same_edits_leave_behind_is_reported(name: str) -> None:
     hundreds = [Hundred(k, 2.0, 3.0, 50.0, 9.0, 600.0, 30, 8) for k in range(4)]
     hundreds[-1] = replace(hundreds[-1], **{name: 1.06 * getattr(hundreds[-1], name)})
     (problem,) = slower(hundreds)

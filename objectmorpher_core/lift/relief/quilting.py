@@ -17,7 +17,8 @@ from ...base.masks import bounds, box_of, widely_blurred
 
 PATCH = 24  # px to a side
 OVERLAP = 8  # px, of neighbours
-COARSE, ROUGHLY = 9.0, 3.0  # px, standard deviation: what is coarser is given; of a small picture
+COARSE = 9.0  # px, standard deviation: what is coarser is given
+ROUGHLY = 3.0  # px, likewise: a wider blur is one of a smaller picture
 STRIDE = 3  # px, between the places that patches are taken from
 MOST = 4_000  # such places
 ELSEWHERE = 1.0  # weight of squared levels of the coarse colours, beside those of the detail

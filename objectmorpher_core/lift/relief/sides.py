@@ -38,7 +38,7 @@ from ...raster.rules import RULES
 from ...raster.texture import TextureLevels, build_levels
 from .canvas import bilinear
 from .colours import fill_in
-from .quilting import quilted
+from .quilting import ROUGHLY, quilted
 from .silhouette import inwardness
 
 AWAY = 45.0  # degrees: sides that this turn shows are textured as they look after it
@@ -71,7 +71,6 @@ BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the col
 INWARD = 0.4  # of the matte's fringe, up to which its colours are not the object's
 EVEN, SMOOTH = 3.0, 8.0  # px, over which the border at which the photo is mirrored is evened
 LIKE, UNLIKE = 8.0, 50.0  # px over which its colours are compared; levels by which others are off
-ROUGHLY = 3.0  # px: a wider blur is one of a smaller picture
 DARK = 24.0  # levels of all channels, in which no light is to be measured
 ALONG = 40  # px from a fringe: what has none has edges, where another face begins
 BENT = 2.5  # of its area, by which it may be larger or smaller

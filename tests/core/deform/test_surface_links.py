@@ -222,13 +222,13 @@ def test_the_papers_graph_knows_no_surface(name):
 
 
 @pytest.mark.parametrize("share", [0.1, 0.6, 1.0, 2.4, 5.2])
-def test_how_thick_a_body_is_is_told_to_a_spacing_however_thin(share):
-    """And nothing is told of what no other side is met behind."""
+def test_the_thickness_of_a_body_is_found_to_a_spacing_however_thin(share):
+    """And nothing where no other side is met behind it."""
     spacing = 1 / 13
     points = shapes.two_sheets(share * spacing)
     up = np.repeat([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], len(points) // 2, axis=0)
-    told = thickness(points, up, spacing, 6 * spacing, SolidSurface(points, up)) / spacing
-    assert np.abs(told - share).max() <= HIT and told.min() > 0
+    found = thickness(points, up, spacing, 6 * spacing, SolidSurface(points, up)) / spacing
+    assert np.abs(found - share).max() <= HIT and found.min() > 0
     alone = points[: len(points) // 2], up[: len(points) // 2]
     assert not thickness(*alone, spacing, 6 * spacing, SolidSurface(*alone)).any()
 
