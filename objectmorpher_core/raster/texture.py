@@ -143,11 +143,11 @@ class TextureRows:
         return replace(self._texture, texels=frozen(self._texture.texels))
 
     def _give_back(self, strip: int) -> None:
-        """What no other strip has a part of."""
+        """What no other strip has a part of (Windows cannot take back a part of a mapping)."""
         width, page = 16 * self._source.shape[1], mmap.PAGESIZE
         start, end = (strip * STRIP * width, (strip + 1) * STRIP * width)
         start, end = -(-start // page) * page, end // page * page
-        if start < end <= len(self._memory) and hasattr(self._memory, "madvise"):
+        if sys.platform != "win32" and start < end <= len(self._memory):
             self._memory.madvise(mmap.MADV_DONTNEED, start, end - start)
 
 
