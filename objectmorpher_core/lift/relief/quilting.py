@@ -222,7 +222,7 @@ def _apart(hole, low, own, heights, i, j, s, t, high, wide):
 def _misfit(detail, have, i, j, s, t, high, wide, enough):
     """Mean squared levels by which a patch from (s, t) differs from what there is at (i, j).
 
-    `enough` at least, where it is more.
+    Infinite, where it is more than `enough`.
     """
     total, count = 0.0, 0
     most = 0.25 * enough * PATCH * PATCH  # of every second row and column
@@ -233,7 +233,7 @@ def _misfit(detail, have, i, j, s, t, high, wide, enough):
                 for c in range(3):
                     total += (detail[i + a, j + b, c] - detail[s + a, t + b, c]) ** 2
         if total > most:
-            return enough
+            return np.inf
     return total / max(count, 1)
 
 
