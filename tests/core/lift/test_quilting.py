@@ -5,10 +5,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from skimage import data
 
 from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.lift.relief.quilting import quilted
+from objectmorpher_core.lift.relief.quilting import PATCH, _misfit, quilted
 from objectmorpher_core.lift.relief.silhouette import inwardness
 
 SIDE = 240  # px
@@ -150,3 +152,18 @@ def test_the_size_of_a_photo_does_not_change_its_fringe():
 
 def test_nothing_has_no_fringe():
     assert (_inward(np.zeros((30, 40), np.float32)) == 1).all()
+
+
+@given(st.integers(0, 10**6), st.floats(0, 3), st.floats(1, 1.1))
+def test_a_patch_that_is_farther_off_than_the_best_is_never_taken_for_as_near(seed, share, luck):
+    """Its comparison ends early, whatever it costs besides and is worth by chance."""
+    rng = np.random.default_rng(seed)
+    detail = rng.normal(0, 20, (2 * PATCH, 2 * PATCH, 3)).astype(np.float32)
+    have = rng.random(detail.shape[:2]) < 0.5
+    places = 0, 0, *rng.integers(0, PATCH, 2), PATCH, PATCH
+    whole = _misfit(detail, have, *places, np.inf)
+    cost = float(rng.random() * 100)
+    best = (cost + share * whole) * luck
+    found = cost + _misfit(detail, have, *places, best / luck - cost)
+    assert found in (cost + whole, np.inf)
+    assert found * luck >= best or (cost + whole) * luck < best
