@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from ...base.arrays import F64
-from .evidence import NORMAL_ERROR, STRIDE, TAIL, Build, Evidence, Misfit, refined
+from .evidence import NORMAL_ERROR, STRIDE, TAIL, Build, Cost, Evidence, Misfit, all_least
 from .solids import Mesh, box
 
 # A flat sheet that looks like the photo: a plane from the network's front and normals.
@@ -67,15 +67,21 @@ def fit_box(evidence: Evidence, hopeless: float = np.inf) -> tuple[Mesh, Misfit]
     `hopeless`: misfit, from which its outline is not looked at more closely.
     """
     guesses = _guesses(evidence)
-    guesses.sort(key=lambda guess: evidence.misfit(guess(np.zeros(9))).total)
-    fits = [refined(guess, np.zeros(9), STEPS, evidence) for guess in guesses[:KEPT]]
-    best = int(np.argmin([misfit.total for _, misfit in fits]))
-    mesh, misfit = guesses[best](fits[best][0]), fits[best][1]
-    if misfit.total > hopeless:
+    guesses.sort(key=lambda guess: _cost(guess, evidence)(np.zeros(9)))
+    costs = [_cost(guess, evidence) for guess in guesses[:KEPT]]
+    fits = all_least(costs, [np.zeros(9)] * len(costs), STEPS)
+    best = int(np.argmin([cost(numbers) for cost, numbers in zip(costs, fits, strict=True)]))
+    numbers = fits[best]
+    mesh = guesses[best](numbers)
+    if (misfit := evidence.misfit(mesh)).total > hopeless:
         return mesh, misfit
-    finer = guesses[best](_outlined(guesses[best], fits[best][0], evidence))
+    finer = guesses[best](_outlined(guesses[best], numbers, evidence))
     is_better = (found := evidence.misfit(finer)).total < misfit.total + WORSE
     return (finer, found) if is_better else (mesh, misfit)
+
+
+def _cost(build: Build, evidence: Evidence) -> Cost:
+    return lambda numbers: evidence.misfit(build(numbers)).total
 
 
 def fit_about(evidence: Evidence) -> tuple[Mesh, Misfit]:

@@ -6,7 +6,7 @@ and its normals are from what the network sees, over what they are expected to b
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -25,35 +25,58 @@ from .solids import Mesh, RayGrid, drawn, face_normals
 
 TRIALS = 18  # of the simplex, for each number
 HOPELESS = 60.0  # misfit, from which nothing comes of refining
+# Misfit, from which what was refined once is not begun again, nor what is so many times worse than
+# the best: 134 photographed and drawn things are recognised as before, in four fifths of the time.
+SPENT, WORSE = 14.0, 1.2
 CLOSE = 0.004  # difference of misfits that no longer matters
 
 Build = Callable[[F64], Mesh]
+Cost = Callable[[F64], float]
 
 
-def refined(build: Build, start: F64, steps: F64, evidence: Evidence) -> tuple[F64, Misfit]:
-    """Numbers (n,) near `start` and their misfit, by the simplex method (Nelder and Mead 1965).
+def least(cost: Cost, start: F64, steps: F64) -> F64:
+    """Numbers (n,) near `start` that cost least, by the simplex method (Nelder and Mead 1965).
 
     `steps` (n,): how far off `start` may well be.
     """
-
-    if (first := evidence.misfit(build(start))).total > HOPELESS:
-        return start, first
-    best = least(lambda numbers: evidence.misfit(build(numbers)).total, start, steps)
-    return best, evidence.misfit(build(best))
+    return start + steps * _again(cost, start, steps, _once(cost, start, steps)[0])[0]
 
 
-def least(cost: Callable[[F64], float], start: F64, steps: F64) -> F64:
-    """Numbers (n,) near `start` that cost least, likewise."""
-    best, size = np.zeros(len(start)), 1.0
-    for _ in range(2):  # begun again where it ended, as it may have collapsed (Kelley 1999)
-        simplex = best + size * np.vstack([np.zeros(len(start)), np.eye(len(start))])
-        found = minimize(
-            lambda change: cost(start + steps * change), best, method="Nelder-Mead",
-            options={"initial_simplex": simplex, "maxfev": TRIALS * len(start), "fatol": CLOSE,
-                     "xatol": 0.02, "adaptive": True},
-        )  # fmt: skip
-        best, size = np.asarray(found.x, np.float64), -0.3
-    return start + steps * best
+def all_least(costs: Sequence[Cost], starts: Sequence[F64], steps: F64) -> list[F64]:
+    """Numbers (n,) near each of `starts` that cost least, likewise.
+
+    Each is refined once, and those that may be the best of them once more.
+    """
+    found = [
+        (np.zeros(len(start)), first)
+        if (first := cost(start)) > HOPELESS else _once(cost, start, steps)
+        for cost, start in zip(costs, starts, strict=True)
+    ]  # fmt: skip
+    most = min(SPENT, WORSE * min(value for _, value in found))
+    return [
+        start + steps * (change if value > most else _again(cost, start, steps, change)[0])
+        for (change, value), cost, start in zip(found, costs, starts, strict=True)
+    ]
+
+
+def _once(cost: Cost, start: F64, steps: F64) -> tuple[F64, float]:
+    """A change (n,), in steps, and what it costs."""
+    return _simplex(cost, start, steps, np.zeros(len(start)), 1.0)
+
+
+def _again(cost: Cost, start: F64, steps: F64, change: F64) -> tuple[F64, float]:
+    """Likewise, begun anew where a simplex ended, as it may have collapsed (Kelley 1999)."""
+    return _simplex(cost, start, steps, change, -0.3)
+
+
+def _simplex(cost: Cost, start: F64, steps: F64, around: F64, size: float) -> tuple[F64, float]:
+    simplex = around + size * np.vstack([np.zeros(len(start)), np.eye(len(start))])
+    found = minimize(
+        lambda change: cost(start + steps * change), around, method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": TRIALS * len(start), "fatol": CLOSE,
+                 "xatol": 0.02, "adaptive": True},
+    )  # fmt: skip
+    return np.asarray(found.x, np.float64), float(found.fun)
 
 
 STRIDE = 4  # px of the crop per cell

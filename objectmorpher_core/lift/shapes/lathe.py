@@ -18,7 +18,7 @@ import numpy as np
 from ...base.arrays import F64, Mask
 from ...base.kernel_files import numba
 from .evidence import STRIDE, Evidence
-from .solids import AROUND, Mesh, revolved
+from .solids import AROUND, Mesh, cross, revolved
 
 TRIED = 40  # places on the axis, at which the profile's ends are looked for
 PLACES = 24  # of the profile itself, while its axis is looked for
@@ -106,17 +106,17 @@ class Lathe:
         axis = np.cos(lean) * flat + np.sin(lean) * forward
         centre = self.depth * ray
         # Where the axis meets the rays of the circles' middles
-        across = np.cross(axis, rays)
-        steps = -(np.cross(centre, rays) * across).sum(1) / np.maximum((across**2).sum(1), 1e-9)
+        across = cross(axis, rays)
+        steps = -(cross(centre, rays) * across).sum(1) / np.maximum((across**2).sum(1), 1e-9)
         most = 2 * self.depth * (self.high - self.low) / max(np.cos(lean), 0.1)
         most = min(most, NEAREST * self.depth / max(abs(axis[2]), 1e-3))
         steps = np.clip(steps, -most, most)
         return self._fitted(centre, steps, axis, places)
 
     def _fitted(self, centre: F64, steps: F64, axis: F64, places: int) -> Profile | None:
-        u = np.asarray(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]), np.float64)
+        u = cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
         u /= np.linalg.norm(u)
-        v = np.cross(axis, u)
+        v = cross(axis, u)
         turn = 2 * np.pi * np.arange(CORNERS) / CORNERS
         ways = np.asarray(np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v, np.float64)
         most = self.depth * (self.high - self.low)
@@ -152,15 +152,15 @@ class Lathe:
         corners = places[:, None] + radii[:, None, None] * ways
         pixels = (corners[..., :2] / corners[..., 2:] - self.start) / self.step
         polygons = np.rint(np.clip(pixels, -1e4, 1e4) * (1 << SHIFT)).astype(np.int32)
-        mask = (self.inside > 0).astype(np.uint8)
+        is_inside = self.inside > 0
 
         def left(polygons: np.ndarray) -> F64:
-            """(n,) of the area, without the first so many, or none."""
-            canvas, grown = np.zeros_like(mask), []
-            for polygon in polygons[::-1]:
-                cv2.fillConvexPoly(canvas, polygon, 1, shift=SHIFT)
-                grown.append(cv2.countNonZero(canvas & mask))
-            return np.array(grown[::-1], np.float64)
+            """(n,) px of the area without the first so many, or none."""
+            latest = np.zeros(is_inside.shape, np.uint8)  # the last that covers each px
+            for k, polygon in enumerate(polygons, 1):
+                cv2.fillConvexPoly(latest, polygon, k, shift=SHIFT)
+            counts = np.bincount(latest[is_inside], minlength=len(polygons) + 1)
+            return np.cumsum(counts[:0:-1])[::-1].astype(np.float64)
 
         whole = left(polygons)
         first = _crossing(whole, (1 - TRIM) * whole[0])

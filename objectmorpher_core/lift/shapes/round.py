@@ -7,14 +7,14 @@ the axis is known: see `lathe`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import cv2
 import numpy as np
 
 from ...base.arrays import F64, Mask
 from ...base.masks import largest_piece
-from .evidence import HOPELESS, STRIDE, Evidence, Misfit, least
+from .evidence import HOPELESS, STRIDE, Evidence, Misfit, all_least, least
 from .lathe import FINER, PLACES, Lathe, Profile, ways_of
 from .solids import AROUND, FINE, Mesh, drawn, ellipsoid, tube
 
@@ -159,6 +159,7 @@ STEPPED = 0.3  # misfit that more places on the axis explain, where the profile 
 SIMPLER = 1.0  # misfit that a radian of a profile's bend outweighs
 ROUNDER = 0.5  # misfit that an ellipsoid outweighs, odd in depth by one of its steps
 KEPT = 2  # leanings that are refined
+CHANGES = np.array([0.15, 0.04, 0.03])  # how far off an axis may well be, as in `_changed`
 LEAST_SHARE = 0.6  # of the mask, that is alike on both sides
 CAPS = (-0.8, 0.0, 0.35, 1.0)  # height of the end that is seen, x its radius
 
@@ -184,14 +185,12 @@ def fit_ellipsoid(evidence: Evidence) -> tuple[Mesh, Misfit]:
 
     for _ in range(2):
         start[:4] += _wider(drawn(build(start), evidence.grid).near > 0, evidence, frame, axes)
-    if evidence.misfit(build(start)).total > HOPELESS:
-        return build(start, FINE), evidence.misfit(build(start))
 
     def cost(numbers: F64) -> float:
         odd = (((numbers - start) / steps)[5:] ** 2).sum()  # no ball, nor an egg that lies across
         return evidence.misfit(build(numbers)).total + ROUNDER * float(odd)
 
-    best = least(cost, start, steps)
+    best = all_least([cost], [start], steps)[0]
     return build(best, FINE), evidence.misfit(build(best))
 
 
@@ -231,32 +230,42 @@ def fit_revolution(
 
     None where nothing is alike on both sides, or all cost more than is `hopeless` at first.
     """
-    trials = []
+    trials: list[tuple[float, Lathe, float]] = []
     for lathe in _lathes(evidence):
         for lean in np.concatenate([LEANS, -LEANS]):
-            if (profile := lathe.profile(lean, np.zeros(2))) is not None:
-                cost = evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
+            if (cost := _cost(lathe, lean, evidence, np.zeros(3))) < np.inf:
                 trials.append((cost, lathe, lean))
     trials.sort(key=lambda trial: trial[0])
     kept = [trial for trial in trials[:KEPT] if trial[0] <= hopeless]
-    fits = [_refined(lathe, lean, evidence) for _, lathe, lean in kept]
-    return min(fits, key=lambda fit: fit[1].total + SIMPLER * fit[2], default=None)
+    if not kept:
+        return None
+    costs = [partial(_cost, lathe, lean, evidence) for _, lathe, lean in kept]
+    numbers = all_least(costs, [np.zeros(3)] * len(costs), CHANGES)
+    fits = [
+        _ended(lathe, lean, own, evidence)
+        for (_, lathe, lean), own in zip(kept, numbers, strict=True)
+    ]
+    return min(fits, key=lambda fit: fit[1].total + SIMPLER * fit[2])
 
 
-def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfit, float]:
-    def built(numbers: F64, places: int = PLACES) -> Profile | None:
-        own = float(np.clip(lean + numbers[0], -STEEPEST, STEEPEST))
-        return lathe.profile(own, numbers[1:], places)
+def _changed(lathe: Lathe, lean: float, numbers: F64, places: int = PLACES) -> Profile | None:
+    """With an axis that is off by `numbers` (3,): its leaning, angle, and place over its length."""
+    own = float(np.clip(lean + numbers[0], -STEEPEST, STEEPEST))
+    return lathe.profile(own, numbers[1:] * [1.0, lathe.high - lathe.low], places)
 
-    def cost(numbers: F64) -> float:
-        profile = built(numbers)
-        if profile is None:
-            return np.inf
-        return evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
 
-    steps = np.array([0.15, 0.04, 0.03 * (lathe.high - lathe.low)])
-    numbers = least(cost, np.zeros(3), steps)
-    profile, stepped = (built(numbers, places) for places in FINER)
+def _cost(lathe: Lathe, lean: float, evidence: Evidence, numbers: F64) -> float:
+    profile = _changed(lathe, lean, numbers)
+    if profile is None:
+        return np.inf
+    return evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
+
+
+def _ended(
+    lathe: Lathe, lean: float, numbers: F64, evidence: Evidence
+) -> tuple[Mesh, Misfit, float]:
+    """The profile with the end that fits best, of more places where these explain more."""
+    profile, stepped = (_changed(lathe, lean, numbers, places) for places in FINER)
     assert profile is not None and stepped is not None, "its start was one"
     shapes = [profile.capped(cap) for cap in CAPS]
     fits = [evidence.misfit(shape.mesh()) for shape in shapes]

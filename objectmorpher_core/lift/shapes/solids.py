@@ -16,6 +16,13 @@ FINE = 96  # of one that is shown
 RINGS = 14  # of a ball; of one that is shown so many times more as it has corners
 
 
+def cross(one: F64, other: F64) -> F64:
+    """The cross products of (..., 3) and (..., 3); numpy's own takes ten times as long for few."""
+    a, b, c = one[..., 0], one[..., 1], one[..., 2]
+    x, y, z = other[..., 0], other[..., 1], other[..., 2]
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
+
+
 # Closed meshes drawn into depth buffers: the nearest and the farthest surface on every ray.
 
 
@@ -69,12 +76,20 @@ def face_normals(mesh: Mesh) -> F64:
 def _face_normals(vertices, faces):
     normals = np.zeros((len(faces), 3))
     for f in range(len(faces)):
-        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-        u, v = b - a, c - a
-        x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+        a, b, c = faces[f]
+        ux, uy, uz = _between(vertices, a, b)
+        vx, vy, vz = _between(vertices, a, c)
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         size = max(np.sqrt(x * x + y * y + z * z), 1e-12)
         normals[f, 0], normals[f, 1], normals[f, 2] = x / size, y / size, z / size
     return normals
+
+
+@numba.njit(cache=True, nogil=True)
+def _between(vertices, a, b):
+    x, y, z = vertices[a]
+    u, v, w = vertices[b]
+    return u - x, v - y, w - z
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -121,9 +136,9 @@ def ellipsoid(centre: F64, columns: F64, around: int = AROUND) -> Mesh:
 def revolved(places: F64, radii: F64, axis: F64, around: int = AROUND) -> Mesh:
     """Rings of `radii` (n,) about `places` (n, 3) on an axis with the direction `axis` (3,)."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    across = np.cross(axis, helper)
+    across = cross(axis, helper)
     across /= np.linalg.norm(across)
-    over = np.cross(axis, across)
+    over = cross(axis, across)
     turn = 2 * np.pi * np.arange(around) / around
     ways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * over
     rings = places[:, None] + radii[:, None, None] * ways
@@ -136,10 +151,10 @@ def tube(centre: F64, axis: F64, sizes: F64, around: int = AROUND) -> Mesh:
 
     `sizes` (3,): its radius, and half of the tube's width, across the axis and along it.
     """
-    across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    across = cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     across /= np.linalg.norm(across)
     turn, own = (2 * np.pi * np.arange(n) / n for n in (around, around // 2))
-    ways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * np.cross(axis, across)
+    ways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * cross(axis, across)
     away = sizes[0] + sizes[1] * np.cos(own)
     vertices = away[:, None] * ways[:, None] + (sizes[2] * np.sin(own))[:, None] * axis
     count = len(own)
