@@ -61,7 +61,7 @@ class PlateTask:
         )
         found = zip(shadows, self.casters, strict=True)
         gone = [s for s, caster in found if s is not None and caster.has_gone]
-        inpainter = compose.load(self.inpaint)
+        inpainter = compose.load(self.inpaint, bool(self.hints))
         if gone:
             plate = traceless_plate(
                 self.pixels, self.covered, gone, inpainter, progress, self.seed, self.hints

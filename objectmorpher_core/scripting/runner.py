@@ -406,7 +406,7 @@ def begun_plate(
     if script.lift not in LIGHT_LIFTERS:
         return None
     try:
-        is_light = compose.load(script.inpaint).name in LIGHT
+        is_light = compose.load(script.inpaint, bool(script.fill_from)).name in LIGHT
     except ValueError:  # which is said when the plate's turn comes
         return None
     if not is_light:

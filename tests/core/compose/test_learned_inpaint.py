@@ -15,9 +15,11 @@ from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import InpaintError, load
 from objectmorpher_core.compose.plate import inpaint_latent, inpaint_onnx
+from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.models import ModelError, device, ledger
 from objectmorpher_core.models.plans import Plan
 from objectmorpher_core.models.tensors_only import take_tensors
+from objectmorpher_core.scripting.background import PlateTask
 from tests.core.compose import tiny_inpainters
 from tests.core.models.local_hub import offering
 from tests.core.models.small_networks import Ways
@@ -199,11 +201,15 @@ def test_memory_that_runs_out_is_followed_by_the_next_tier(pixelhacker, view, ho
     assert next(ledger.SHARED.opened("PixelHacker")[0].parameters()).dtype == torch.float32
 
 
-def test_auto_takes_what_is_there_and_quick_and_heeds_hints(family, monkeypatch):
+def test_auto_takes_what_is_there_and_quick_and_heeds_hints(family, view, hole, monkeypatch):
     name, _ = family
     monkeypatch.setenv(device.DEVICE, "cpu")
     assert load("auto").name == ("patchmatch" if name in tiny_inpainters.LATENT else name)
     assert load("auto", has_hints=True).name == "patchmatch"
+    hints = (Hint((10.0, 10.0), (60.0, 50.0), 20.0),)
+    tasks = (PlateTask(view, hole, (), hints, inpaint, 0) for inpaint in ("auto", "patchmatch"))
+    one, two = (task.run(silent).plate.pixels for task in tasks)
+    np.testing.assert_array_equal(one, two)
     models.remove_hub(name)
     assert load("auto").name == "patchmatch"
     with pytest.raises(InpaintError, match=f"models get {name}"):
