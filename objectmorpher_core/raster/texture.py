@@ -145,9 +145,10 @@ class TextureRows:
     def _give_back(self, strip: int) -> None:
         """What no other strip has a part of (Windows cannot take back a part of a mapping)."""
         width, page = 16 * self._source.shape[1], mmap.PAGESIZE
-        start, end = (strip * STRIP * width, (strip + 1) * STRIP * width)
+        last = min((strip + 1) * STRIP, self._source.shape[0])  # the halved copies lie behind it
+        start, end = strip * STRIP * width, last * width
         start, end = -(-start // page) * page, end // page * page
-        if sys.platform != "win32" and start < end <= len(self._memory):
+        if sys.platform != "win32" and start < end:
             self._memory.madvise(mmap.MADV_DONTNEED, start, end - start)
 
 

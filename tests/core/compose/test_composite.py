@@ -22,7 +22,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement, Pose
 from objectmorpher_core.raster import texture as texture_module
 from objectmorpher_core.raster import tiles
-from objectmorpher_core.raster.texture import TextureRows
+from objectmorpher_core.raster.texture import TextureRows, TextureSource
 from tests import shapes
 from tests.tree import quick
 
@@ -335,6 +335,19 @@ def test_of_a_texture_by_rows_only_what_is_looked_at_takes_memory(monkeypatch):
     first = 200 - int(scene.texture.top)
     part = rows.looked_at(low, high).levels[0][first : first + 32]
     assert np.array_equal(part, whole[first : first + 32])
+
+
+@pytest.mark.parametrize("height", [300, 384, 401])
+def test_what_is_given_back_of_a_texture_is_no_row_of_its_halved_copies(height):
+    """Whatever its height, of which the last strip is a part only."""
+    rng = np.random.default_rng(height)
+    colours, alpha = (rng.random(shape, np.float32) for shape in ((height, 512, 3), (height, 512)))
+    source = TextureSource(lambda a, b: (colours[a:b], alpha[a:b]), (height, 512), 0.0, 0.0)
+    rows = TextureRows(source)
+    rows.looked_at(np.array([height - 2.0]), np.array([height - 1.0]))
+    seen = rows.looked_at(np.array([0.0]), np.array([1.0]))
+    for own, whole in zip(seen.levels[1:], source.levels().levels[1:], strict=True):
+        np.testing.assert_array_equal(own, whole)
 
 
 def test_a_texture_is_there_by_rows_from_its_area_on(monkeypatch):
