@@ -1,6 +1,8 @@
 import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
 
-from objectmorpher_core.base.masks import box_of, dilated, disc, largest_piece
+from objectmorpher_core.base.masks import box_of, dilated, disc, largest_piece, opened
 
 
 def test_a_box_is_around_what_there_is_and_stays_inside() -> None:
@@ -33,3 +35,13 @@ def test_a_mask_is_dilated_by_a_disc() -> None:
     around = dilated(mask, 3)
     assert (around[2:9, 2:9] == (disc(3) > 0)).all() and around.sum() == disc(3).sum()
     assert disc(3)[0].sum() == 1 and disc(3)[3].all()
+
+
+@given(st.integers(0, 10**6), st.floats(0.2, 0.9))
+def test_an_opened_mask_is_its_squares_of_two_pixels(seed: int, share: float) -> None:
+    mask = np.random.default_rng(seed).random((9, 12)) < share
+    square = mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]
+    expected = np.zeros_like(mask)
+    for rows, columns in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        expected[rows : rows + 8, columns : columns + 11] |= square
+    assert (opened(mask) == expected).all()

@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, I64, Mask, Pixels, crop, pixels_from_unit, unit_pixels
 from ...base.camera import Camera
-from ...base.masks import LARGE, box_of, disc
+from ...base.masks import LARGE, box_of, disc, opened
 from ...base.threads import core_count
 from ...document.model import Document, EditObject, Matte, Placement, Plate
 from ...document.placement import is_in_place
@@ -132,7 +132,7 @@ def _unlit(light: F32, covered: Mask, deep: int) -> Mask:
         return strip
     foot = lowest.max() - FOOT * (lowest.max() - np.argmax(covered.any(1)))
     dark = ~covered & (rows - above <= deep) & (light < UNLIT * ground)
-    dark = cv2.morphologyEx(dark.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
+    dark = opened(dark).astype(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(dark, connectivity=8)
     touched = cv2.dilate(covered.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     least = WIDE * np.count_nonzero(lowest >= foot)
