@@ -137,13 +137,20 @@ def _filled(
         whole = _resized(answer, longer)[above : above + height, before : before + width]
         return np.where(hole[..., None], pixels_from_unit(whole, crop.dtype), crop)
     scale = side / longer
-    top, left = round(above * scale), round(before * scale)
-    inner = (
-        slice(top, top + max(1, round(height * scale))),
-        slice(left, left + max(1, round(width * scale))),
-    )
-    invented = np.where(is_known[..., None], guess, answer)[inner] * np.float32(255)
-    sources = sources_like(invented, ~is_known[inner], seed, part(progress, 0.9, 1.0))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    step = np.array([width, height]) * scale / size  # px of the square, nearly 1
+    start = scale * np.array([before, above]) + 0.5 * step - 0.5
+
+    def inner(square: F32) -> F32:
+        """What of the square is the crop, be it between its pixels."""
+        there = np.column_stack([np.diag(step), start])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        part = cv2.warpAffine(square, there, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(part, np.float32)
+
+    invented = inner(np.where(is_known[..., None], guess, answer) * np.float32(255))
+    unknown = inner((~is_known).astype(np.float32)) > 0
+    sources = sources_like(invented, unknown, seed, part(progress, 0.9, 1.0))
     return with_detail(crop, hole, invented, sources, low_pass=1)
 
 

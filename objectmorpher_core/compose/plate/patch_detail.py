@@ -62,10 +62,11 @@ def _copy_detail(crop, hole, rough, sources, filled, first, last):
                     i, j = places[k]
                     is_inside = 0 <= i < height and 0 <= j < width
                     if shares[k] > 0 and is_inside and not hole[i, j]:
-                        low = _level(rough, i / height, j / width, c)
+                        low = _level(rough, (i + 0.5) / height, (j + 0.5) / width, c)
                         value += shares[k] * (np.float64(crop[i, j, c]) - low)
                         total += shares[k]
-                value = value / max(total, 1e-9) + _level(rough, y / height, x / width, c)
+                low = _level(rough, (y + 0.5) / height, (x + 0.5) / width, c)
+                value = value / max(total, 1e-9) + low
                 filled[y, x, c] = np.rint(min(max(value, 0.0), top))
 
 
@@ -97,7 +98,7 @@ def _find_places(sources, zoom, width, place, shares, places):
 
 @numba.njit(cache=True, nogil=True)
 def _level(rough, v, u, c):
-    """Channel `c` of `rough` (h, w, 3) at (v, u) in [0, 1), linear between its pixels."""
+    """Channel `c` of `rough` (h, w, 3) at (v, u) in (0, 1), linear between its pixels' centres."""
     rows, columns = rough.shape[:2]
     v, u = v * rows - 0.5, u * columns - 0.5
     v, u = min(max(v, 0.0), rows - 1.0), min(max(u, 0.0), columns - 1.0)

@@ -13,6 +13,7 @@ from objectmorpher_core.base.arrays import frozen
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.plate.completion import complete, smooth
+from objectmorpher_core.compose.plate.patch_detail import with_detail
 from objectmorpher_core.compose.plate.patch_search import patch_cost, vote
 from objectmorpher_core.compose.plate.plate import build_plate, plate_cover, plate_picture
 from objectmorpher_core.compose.plate.sources import (
@@ -286,3 +287,20 @@ def test_a_tone_that_is_wanted_decides_between_textures():
     lit, dark = grey[~hole & (x < 112)].mean(), grey[:, 116:].mean()
     assert min(means[0]) > 0.8 * lit and means[1][0] > 0.8 * lit
     assert means[1][1] < 0.5 * (lit + dark)
+
+
+@pytest.mark.parametrize("zoom", [1, 2, 4, 8])
+def test_what_is_copied_from_the_mirror_image_is_what_it_shows(zoom, coffee):
+    """Of a picture that is its own mirror image, a hole comes back as it was."""
+    half = cv2.resize(coffee[:64, :96], (96, 128))
+    picture = np.concatenate([half, half[:, ::-1]], axis=1)
+    hole = np.zeros(picture.shape[:2], bool)
+    hole[40:88, 16:64] = True
+    size = picture.shape[1] // zoom, picture.shape[0] // zoom
+    small = cv2.resize(picture.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    rows, columns = np.mgrid[: size[1], : size[0]]
+    sources = np.dstack([np.ones_like(rows), rows, columns]).astype(np.int32)
+    filled = with_detail(picture, hole, small, sources)
+    off = np.abs(filled.astype(int) - picture)
+    assert off[hole].max() <= 1
+    assert off[~hole].max() == 0

@@ -95,3 +95,24 @@ def test_seed_and_16_bit(china):
     assert told == [7]
     np.testing.assert_array_equal(filled[~hole], photo[~hole])
     assert (filled[hole] == round(0.12345 * 65535)).all()
+
+
+@pytest.mark.parametrize("shape", [(341, 601), (400, 600), (384, 512)])
+def test_a_fill_lies_where_it_belongs_in_a_crop_that_is_no_square(shape, china):
+    """The answer is the true picture: what of it is put in is not shifted."""
+    height, width = shape
+    crop = cv2.GaussianBlur(cv2.resize(china, (width, height)), (0, 0), 3.0)
+    hole = np.zeros(shape, np.uint8)
+    cv2.ellipse(hole, (width // 2, height // 2), (width // 3, height // 3), 0, 0, 360, 1, -1)
+    longer = max(shape)
+    above, before = (longer - height) // 2, (longer - width) // 2
+    rims = (above, longer - height - above), (before, longer - width - before), (0, 0)
+    square = np.pad(crop.astype(np.float32) / 255, rims, mode="symmetric")
+    truth = cv2.resize(square, (256, 256), interpolation=cv2.INTER_AREA)
+    found = fill_squares(crop, hole > 0, Filler(256, lambda *_: truth))
+    off = (found.astype(np.float32) - crop).mean(-1)
+    down, across = np.gradient(crop.astype(np.float32).mean(-1))
+    inner = cv2.erode(hole, np.ones((9, 9))) > 0
+    ways = np.column_stack([-across[inner], -down[inner]])
+    shift = np.linalg.lstsq(ways, off[inner], rcond=None)[0]
+    assert np.abs(shift).max() < 0.1, "px"
