@@ -60,7 +60,7 @@ class PieceView:
             salience = np.asarray(cv2.resize(salience, size), np.float32)
         self.ground = PieceGround(pieces, salience, is_of_large, embedding.tokens)
         self._image = reduced(rgb)
-        self._known: dict[Prompt, PieceAnswer] = {}
+        self._known: dict[tuple[Prompt, int | None], PieceAnswer] = {}  # and by the whole
         self._choices: dict[Prompt, PieceChoice] = {}
 
     def answer(self, prompt: Prompt, whole: Mask | None, progress: Progress) -> PieceAnswer:
@@ -68,18 +68,20 @@ class PieceView:
 
         `whole` (H, W): what its first click means at the level "object", where it has another.
         """
+        small = None if whole is None else self._reduced(whole)
+        within = None if small is None else hash(small.tobytes())
         steps = steps_of(prompt)
-        known = next((k for k in range(len(steps) - 1, -1, -1) if steps[k] in self._known), -1)
-        answer = self._known[steps[known]] if known >= 0 else None
+        keys = [(step, within) for step in steps]
+        known = next((k for k in range(len(steps) - 1, -1, -1) if keys[k] in self._known), -1)
+        answer = self._known[keys[known]] if known >= 0 else None
         for k in range(known + 1, len(steps)):
             progress(k / len(steps), "looking for its outline")
             if answer is None:
-                small = None if whole is None else self._reduced(whole)
                 choice = self.choice(steps[k])
                 answer = begin(self.ground, self._image, steps[k], choice, small)
             else:
                 answer = add_click(self.ground, self._image, answer, steps[k])
-            _remember(self._known, steps[k], answer, REMEMBERED)
+            _remember(self._known, keys[k], answer, REMEMBERED)
         assert answer is not None, "a prompt has at least one step"
         return answer
 
@@ -328,8 +330,12 @@ def _remember(kept: dict[Any, Any], key: object, value: object, count: int) -> N
 
 
 def _tile(low: float, high: float, side: float, length: int) -> float:
-    """Where the tile begins, of those that begin every half side, whose middle is nearest."""
+    """Where the tile begins, of those that begin every half side, whose middle is nearest.
+
+    Elsewhere, where that would cut what reaches from `low` to `high`.
+    """
     begin = round(((low + high) / 2 - side / 2) / (side / 2)) * side / 2
+    begin = min(max(begin, high - side), low)
     return min(max(begin, 0.0), length - side)
 
 

@@ -9,11 +9,14 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from objectmorpher_core import segment
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.document.model import BesidePrompt, Click, Prompt
 from objectmorpher_core.pipeline import Reading
+from objectmorpher_core.segment.pieces.view import FITS, _tile
 from tests.core.segment.composites import composite, picture
 from tests.core.segment.encoded import dino, embedding
 from tests.core.segment.simulated_user import Step, around, boundary_f, inmost, overlap, use
@@ -368,3 +371,26 @@ def test_a_glance_at_what_is_large_is_all_there_is_to_see():
     assert found.is_final
     whole = backend.segment(photo("coffee"), asked, embedding("coffee"), silent)
     np.testing.assert_array_equal(found.mask, whole)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("afresh")
+@pytest.mark.parametrize("at", [(409.5, 52.5), (29.5, 56.5)])
+def test_a_part_is_the_same_whether_it_was_glanced_at_before(at):
+    asked, known = Prompt((Click(*at),), level="part"), embedding("astronaut")
+    whole = segment.load("dino").segment(photo("astronaut"), asked, known, silent)
+    backend = segment.load("dino")
+    assert isinstance(backend, segment.Quick)
+    backend.glance(photo("astronaut"), asked, known, silent)
+    again = backend.segment(photo("astronaut"), asked, known, silent)
+    np.testing.assert_array_equal(again, whole)
+
+
+@given(st.floats(0, 1), st.floats(0.01, FITS), st.floats(0.1, 1))
+def test_a_tile_holds_what_fits_it(start, extent, share):
+    length = 4000
+    side = share * length
+    low = start * (length - extent * side)
+    begin = _tile(low, low + extent * side, side, length)
+    assert 0 <= begin <= length - side + 1e-6
+    assert begin <= low + 1e-6 and low + extent * side <= begin + side + 1e-6
