@@ -34,6 +34,7 @@ from ...raster.rules import ONE, ZERO
 SIDE = 448  # px, to which the longer side of either object is resized before details are sought
 MARGIN = 0.05  # x that side, around the object
 INSIDE = 3  # px of that picture: nearer to the outline a detail is of the background
+ALIASED = 0.4  # px of that picture, standard deviation: what is finer would be aliased
 CONTRAST = 0.01  # of a detail, x the whole range: what is faint helps too, wrong pairs are few
 MOST = 2000  # details of a picture
 RATIO = 0.85  # x the distance to the second best detail, above which nobody knows which it is
@@ -117,7 +118,9 @@ def _details(pixels: Pixels, mask: Mask) -> tuple[F64, F32]:
     warp[:, 2] = zoom * (0.5 - corner) - 0.5
     grey = cv2.cvtColor(to_u8(pixels), cv2.COLOR_RGB2GRAY)
     own = np.where(mask, grey, np.uint8(grey[mask].mean()))  # no background, no edge beyond it
-    way = cv2.INTER_CUBIC if zoom > 1 else cv2.INTER_AREA
+    if zoom < 1:  # no warp of OpenCV's takes means
+        own = cv2.GaussianBlur(own, (0, 0), ALIASED / zoom)
+    way = cv2.INTER_CUBIC if zoom > 1 else cv2.INTER_LINEAR
     own = cv2.warpAffine(own, warp, (SIDE, SIDE), flags=way, borderMode=cv2.BORDER_REPLICATE)
     inside = cv2.warpAffine(mask.astype(np.uint8), warp, (SIDE, SIDE), flags=cv2.INTER_NEAREST)
     inside = cv2.erode(inside, np.ones((2 * INSIDE + 1, 2 * INSIDE + 1), np.uint8))

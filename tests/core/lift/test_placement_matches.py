@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.lift.registration.placement import Hints, Registrar, register
-from objectmorpher_core.lift.registration.sketch import LEAST, Matches, alike
+from objectmorpher_core.lift.registration.sketch import LEAST, SIDE, Matches, alike
 from objectmorpher_core.lift.registration.sketch import NEAR_MATCH as NEAR
 from tests.core.lift import registered
 from tests.core.lift.registered import CAMERA, Body, Scene
@@ -144,3 +145,16 @@ def test_matches_tell_the_turn_that_outline_and_colours_do_not():
     told = Registrar(registered.gaussians(body), scene.target, matches=matches)
     for other in blind.proposals:  # the accepted pose is never worse
         assert found.best.score >= told.rated(other.world_from_object).score
+
+
+def test_a_large_photo_is_not_aliased_before_details_are_sought(coffee):
+    """Its noise is averaged as it becomes smaller, and the same places are found again."""
+    rng = np.random.default_rng(0)
+    large = cv2.resize(coffee[60:340, 150:450], None, fx=10, fy=10, interpolation=cv2.INTER_CUBIC)
+    mask = np.zeros(large.shape[:2], bool)
+    mask[300:2500, 300:2700] = True
+    seen = [np.clip(large + rng.normal(0, 12, large.shape), 0, 255).astype(np.uint8) for _ in "ab"]
+    at, there = alike((seen[0], mask), (seen[1], mask))
+    off = np.linalg.norm(at - there, axis=1) * SIDE / 2400
+    assert (off < 1).sum() > 150
+    assert np.median(off) < 0.25, "px of the smaller picture"
