@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 # Pictures that are no files: arrays and Pillow's images, in and out of a `Picture`.
 
 CHANNELS = {1: "grey", 2: "grey and alpha", 3: "RGB", 4: "RGB and alpha"}
-AS_PNG = ("1", "L", "LA", "P", "PA", "RGB", "RGBA")  # modes of Pillow that PNG holds as they are
+AS_PNG = ("1", "L", "LA", "P", "RGB", "RGBA")  # modes of Pillow that PNG holds as they are
 AS_TIFF = ("CMYK", "LAB")
-WITH_ALPHA = ("RGBa", "La")
+WITH_ALPHA = {"RGBa": "RGBA", "La": "LA", "PA": "RGBA"}  # what they become first
 
 
 def encode_array(array: np.ndarray) -> bytes:
@@ -57,7 +57,7 @@ def encode_pil(image: Image.Image) -> bytes:
         raise ImageError(f"an image of mode {image.mode} is no photo; convert it to RGB")
     kind = "TIFF" if image.mode in AS_TIFF else "PNG"
     if image.mode not in (*AS_PNG, *AS_TIFF):
-        image = image.convert("RGBA" if image.mode in WITH_ALPHA else "RGB")
+        image = image.convert(WITH_ALPHA.get(image.mode, "RGB"))
     more = {"exif": found} if (found := image.getexif()) else {}
     out = io.BytesIO()
     image.save(out, kind, icc_profile=image.info.get("icc_profile"), **more)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MARKS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # classic and BigTIFF
 SHORT, LONG, UNDEFINED = 3, 4, 7  # types of a tag's values
-ASSOCIATED_ALPHA = 1
+ASSOCIATED_ALPHA, STRAIGHT_ALPHA = 1, 2
 WHITE_IS_ZERO, BLACK_IS_ZERO, RGB = 0, 1, 2
 DEFLATE, HORIZONTAL_DIFFERENCES = 8, 2
 DEFLATE_LEVEL = 1  # 3 takes twice as long for 5 % less
@@ -58,8 +58,9 @@ def read_16_bit(data: bytes, max_pixels: int) -> tuple[np.ndarray, int] | None:
     colours = 3 if page.photometric == RGB else 1
     if page.photometric == WHITE_IS_ZERO:
         samples = np.concatenate([65535 - samples[..., :1], samples[..., 1:]], axis=2)
-    samples = samples[..., : colours + bool(page.extrasamples)]
-    if page.extrasamples and page.extrasamples[0] == ASSOCIATED_ALPHA:
+    extra = page.extrasamples[0] if page.extrasamples else None  # or something else than alpha
+    samples = samples[..., : colours + (extra in (ASSOCIATED_ALPHA, STRAIGHT_ALPHA))]
+    if extra == ASSOCIATED_ALPHA:
         samples = _unpremultiplied(samples)
     tag = page.tags.get(274)
     return samples, int(tag.value) if tag is not None and 1 <= int(tag.value) <= 8 else 1

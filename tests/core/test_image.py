@@ -17,6 +17,7 @@ from objectmorpher_core.pictures.image import (
     Picture,
     encode_mask,
     encode_picture,
+    encode_pil,
     read_mask,
     read_picture,
     resized,
@@ -377,3 +378,20 @@ def test_resized_keeps_the_mean(chelsea):
         small = resized(chelsea, width, height)
         assert small.shape == (height, width, 3)
         assert abs(small.mean() - chelsea.mean()) < 0.5
+
+
+@over("mode", ["1", "L", "LA", "La", "P", "PA", "RGB", "RGBA", "RGBa", "CMYK", "YCbCr", "HSV"])
+def test_every_mode_of_pillow_becomes_a_picture(mode: str, chelsea: np.ndarray) -> None:
+    image = Image.fromarray(chelsea[:20, :30]).convert("L" if mode in ("La", "PA") else "RGB")
+    for step in {"La": ("LA", "La"), "PA": ("P", "PA"), "RGBa": ("RGBA", "RGBa")}.get(
+        mode, (mode,)
+    ):
+        image = image.convert(step)
+    assert read_picture(encode_pil(image)).pixels.shape == (20, 30, 3)
+
+
+def test_a_tiff_channel_that_is_no_alpha_is_left_out_at_any_depth(chelsea: np.ndarray) -> None:
+    samples = np.dstack([chelsea[:20, :30], chelsea[:20, :30, :1]])
+    for kind in (np.uint8, np.uint16):
+        data = tiff_bytes(samples.astype(kind), photometric="rgb", extrasamples=["unspecified"])
+        assert read_picture(data).alpha is None

@@ -182,17 +182,20 @@ def _look(mesh: Any) -> Look:
     is_opaque = mode not in ("MASK", "BLEND")
     if image is None or getattr(mesh.visual, "uv", None) is None:
         return Look(None, cutoff, is_opaque)
-    return Look(Texture(_rgba(image)), cutoff, is_opaque)
+    return Look(Texture(_rgba(image, is_opaque)), cutoff, is_opaque)
 
 
-def _rgba(image: Any) -> U8:
-    """Straight sRGB pixels (H, W, 4) of a picture that was opened and not yet decoded."""
+def _rgba(image: Any, is_opaque: bool) -> U8:
+    """Straight sRGB pixels (H, W, 4) of a picture that was opened and not yet decoded.
+
+    The alpha of what `is_opaque` means nothing: it may be something else.
+    """
     if max(image.size) > MAX_SIDE:
         raise SplatFileError(f"a texture of the mesh is larger than {MAX_SIDE} px")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            image = image.convert("RGBA")
+            image = (image.convert("RGB") if is_opaque else image).convert("RGBA")
     except (OSError, ValueError, SyntaxError) as error:
         raise SplatFileError("a texture of the mesh cannot be read") from error
     factor = -(-max(image.size) // WORKING)

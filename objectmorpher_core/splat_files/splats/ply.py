@@ -308,8 +308,10 @@ def read_points(stream: IO[bytes], header: PlyHeader, size: int) -> Gaussians:
 
 def _color_scale(forms: dict[str, str], names: tuple[str, ...] | None) -> np.float32:
     """What brings a stored colour to [0, 1]."""
-    most = {"u1": 255.0, "u2": 65535.0}
-    return np.float32(1 / most.get(forms[names[0]] if names else "", 1.0))
+    form = forms[names[0]] if names else "f4"
+    if form.startswith("f"):
+        return np.float32(1)
+    return np.float32(1 / (65535 if form == "u2" else 255))
 
 
 def _splats(points: F64, colors: np.ndarray, normals: F64 | None) -> Gaussians:

@@ -164,6 +164,10 @@ def test_alpha_means_nothing_in_an_opaque_material(tmp_path, picture):
     cloud = read(mesh_files.written(tree, tmp_path / "a.gltf"), SAMPLES)
     assert (cloud.opacities == 1).all()
     assert np.abs(cloud.colors - COLORS[faces_of(cloud)] / 255).max() < 0.03
+    drawn[:, ::2, 3] = 0  # nor does it where there is none
+    tree = mesh_files.gltf(image=mesh_files.png(drawn))
+    other = read(mesh_files.written(tree, tmp_path / "b.gltf"), SAMPLES)
+    np.testing.assert_array_equal(cloud.colors, other.colors)
 
 
 def test_nodes_move_turn_scale_and_mirror_their_meshes(tmp_path):

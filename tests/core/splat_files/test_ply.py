@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.splat_files import read
 from objectmorpher_core.splat_files.limits import LEAST_SCALE
 from objectmorpher_core.splat_files.splats.ply import (
     FLATNESS,
@@ -55,7 +56,8 @@ def foreign_file(columns: dict[str, np.ndarray], kind: str, types: dict[str, str
         body = "7\n8\n" + "".join(" ".join(map(repr, map(float, r))) + "\n" for r in rows)
         return head + body.encode() + b"3 0 1 2\n"
     order = "<" if "little" in kind else ">"
-    codes = {"float": "f4", "double": "f8", "uchar": "u1"}
+    codes = {"float": "f4", "double": "f8", "uchar": "u1", "short": "i2", "int": "i4"}
+    codes["uint"] = "u4"
     row = [(name, order + codes[types.get(name, "float")]) for name in columns]
     table = np.empty(count, row)
     for name, column in columns.items():
@@ -92,6 +94,18 @@ def test_files_of_other_programs(kind, degree):
     shuffled = {name: columns[name] for name in names}
     data = foreign_file(shuffled, kind, {"label": "uchar", "x": "double"})
     assert_close(decode_ply(data), cloud)
+
+
+@over("kind", ["uchar", "short", "int", "uint"])
+def test_colours_of_points_are_read_from_any_whole_numbers(kind, tmp_path):
+    rng = np.random.default_rng(0)
+    columns = {name: rng.normal(0, 1, 20) for name in "xyz"}
+    columns |= {"red": np.full(20, 102), "green": np.full(20, 51), "blue": np.zeros(20)}
+    types = dict.fromkeys(("red", "green", "blue"), kind)
+    path = tmp_path / "points.ply"
+    data = foreign_file(columns, "binary_little_endian", types)
+    path.write_bytes(data.replace(b"element face 1\n", b"element face 0\n"))
+    assert np.abs(read(path).colors - [0.4, 0.2, 0.0]).max() < 1e-6
 
 
 def test_quaternions_are_made_unit():
