@@ -103,7 +103,7 @@ def _rows(document: Document, splats: Mapping[int, PosedSplats | None]) -> dict[
     where a foot would be seen at its depth, on the ground of the first that stands.
     """
     objects, camera = document.objects, document.photo.camera
-    standing = [o.lifted for o in objects if o.lifted and not o.is_visitor and not _floats(o)]
+    standing = [o.lifted for o in objects if o.lifted and not o.is_visitor and not o.is_floating]
     ground, below, depth = 0.0, float(camera.height), 1.0
     if standing:
         nodes = standing[0].world_points(standing[0].control_points)
@@ -114,7 +114,7 @@ def _rows(document: Document, splats: Mapping[int, PosedSplats | None]) -> dict[
     for k, own in splats.items():
         if own is None:
             rows[k] = np.inf
-        elif _floats(objects[k]):
+        elif objects[k].is_floating:
             middle = max(float(np.median(own.nodes[:, 2])), 1e-9)
             rows[k] = round(ground + below * (depth / middle - 1), DIGITS)
         else:
@@ -134,11 +134,6 @@ def _lies_flat(item: EditObject, document: Document, nodes: F64) -> bool:
     around = own - np.outer(heights, down)
     _, narrow, _ = np.sqrt(np.linalg.eigvalsh(around.T @ around / len(own)).clip(0))
     return float(heights.std()) < FLAT * float(narrow)
-
-
-def _floats(item: EditObject) -> bool:
-    """Whether the artist says that it does not stand."""
-    return not (item.shape.is_standing or item.is_grounded)
 
 
 def _row(nodes: F64, camera: Camera, end: Callable[[F64], float]) -> float:

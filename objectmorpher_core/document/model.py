@@ -414,6 +414,11 @@ class EditObject:
         return self.matte_here is not None
 
     @property
+    def is_floating(self) -> bool:
+        """Whether it neither stands nor is on the ground: it is drawn after how far away it is."""
+        return not (self.shape.is_standing or self.is_grounded)
+
+    @property
     def is_moved(self) -> bool:
         """Whether the object is anywhere else than in the photo, or looks otherwise."""
         return self.lifted is not None and (
@@ -568,6 +573,7 @@ class Document:
 SHOWN = (
     "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
     "harmony", "relight", "grain", "defocus", "stays_in_front", "finish", "seen_from",
+    "is_floating",
 )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.order import back_to_front, leaves_a_hole, reordered, stack
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.model import Document, Placement, show_the_same
 from objectmorpher_core.document.paint import SIDE, Paint, PaintTile
 from objectmorpher_core.raster.posed import PosedSplats
 from tests import shapes
@@ -282,3 +282,14 @@ def test_names_can_be_changed_but_not_be_empty():
     assert edits.duplicate(document, 0).objects[2].name == "Cat 3 copy"
     with pytest.raises(edits.EditError, match="name"):
         edits.rename(document, 0, " ")
+
+
+def test_what_looks_the_same_is_drawn_in_the_same_order():
+    """So a refinement of the edit does not stay when what is put on the ground changes it."""
+    away = _moved(_two_discs(), 0, Placement(move=(ACROSS, 20.0), depth=1.3))
+    floating = replace(away.objects[0], shape=replace(away.objects[0].shape, is_standing=False))
+    one = away.with_object(0, floating)
+    other = edits.set_grounded(one, 0, True)
+    assert _order(one) != _order(other)
+    assert not show_the_same(one, other)
+    assert show_the_same(away, edits.set_grounded(away, 0, True))
