@@ -19,6 +19,7 @@ from objectmorpher_core.base.arrays import Mask, crop
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
 from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.transparency import continued
 
 from ...canvas.memo import same
 from ...system.texts import t
@@ -210,7 +211,7 @@ class OldShadows:
         is_known = item.shadow.ground is not None or document.horizon is not None
         ground = seen_from(document, k, item.shadow) if is_known else None
         covered = self._editor.derived.hidden(document)
-        return Cutout(document.photo.pixels, item.matte, covered, ground)
+        return Cutout(continued(document.photo.picture, covered), item.matte, covered, ground)
 
     def _suggest(self, offer: ShadowOffer) -> None:
         """Offers what was found unasked, where nothing else is offered."""
