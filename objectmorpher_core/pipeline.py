@@ -379,7 +379,7 @@ class _Run:
         with self.stopwatch.stage("segment"):
             if mask is not None:
                 found: Selection = read_coverage(mask, self.document.photo.size)
-                backend = "mask"
+                backend, prompt = "mask", Prompt()
             else:
                 reading = self._reading(script.segment, part(progress, 0.0, 0.6))
                 wanted = edits.beside(self.document, len(self.document.objects), prompt)
