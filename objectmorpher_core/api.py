@@ -263,10 +263,12 @@ class Edit:
         if {"fov", "seed"} & said:
             photo = self.document.photo
             fresh = open_photo(photo.source, photo.name, script.fov, script.seed)
-            return replace(edit, document=fresh)
+            edit = replace(edit, document=fresh)
+        elif options_of(CHOOSING, SHAPE) & said:
+            edit = edit._unlifted
         if "mask" in said and script.mask is not None:
             return edit.mask(script.mask)
-        return edit._unlifted if options_of(CHOOSING, SHAPE) & said else edit
+        return edit
 
     @property
     def _unlifted(self) -> Edit:

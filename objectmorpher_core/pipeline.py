@@ -379,7 +379,7 @@ class _Run:
         with self.stopwatch.stage("segment"):
             if mask is not None:
                 found: Selection = read_coverage(mask, self.document.photo.size)
-                backend = "mask"
+                backend, prompt = "mask", Prompt()
             else:
                 reading = self._reading(script.segment, part(progress, 0.0, 0.6))
                 wanted = edits.beside(self.document, len(self.document.objects), prompt)
@@ -464,7 +464,8 @@ def _lift(
             use_matte,
         )  # fmt: skip
         return edits.set_lifted(document, k, *made, settings)
-    is_free = script.fov is None and not photo.picture.focal_35mm
+    is_alone = all(item.lifted is None for i, item in enumerate(document.objects) if i != k)
+    is_free = is_alone and script.fov is None and not photo.picture.focal_35mm
     scene = ImportTarget(photo.pixels, photo.camera, mask, is_free)
     source = Source(Path(script.splats), script.gaussians or COUNT, script.flip)
     found = register_file(source, scene, part(progress, 0.0, 0.8), script.seed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, is_dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -64,6 +65,21 @@ def frozen_rows(matrix: Sparse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     scipy's indices are of 64 bits after some sums: a kernel would be compiled anew for them.
     """
     return frozen(matrix.indptr, np.int32), frozen(matrix.indices, np.int32), frozen(matrix.data)
+
+
+def same_values(one: Any, other: Any) -> bool:
+    """Whether two arrays, dataclasses or tuples hold equal values; those that share them do."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(one, other)
+    if is_dataclass(one):
+        return all(same_values(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same_values, one, other))
+    return bool(one == other)
 
 
 class PixelSource(Protocol):

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.arrays import same_values
 from .edits import EditError
 from .model import Document, EditObject, KeyPose
 
@@ -91,9 +92,11 @@ def _posed(item: EditObject, key: KeyPose) -> EditObject:
 
 
 def _is_same(one: KeyPose, other: KeyPose) -> bool:
-    """Poses that were computed twice are two, though they may look the same."""
-    return one.placement == other.placement and (
-        one.pose is other.pose and one.handles == other.handles
+    """Whether pose, handles and place hold equal values, as they do in a session that was read."""
+    return (
+        one.placement == other.placement
+        and same_values(one.pose, other.pose)
+        and same_values(one.handles, other.handles)
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .. import compose
-from ..base.arrays import F32, F64, Mask, Selection, crop
+from ..base.arrays import F32, F64, Mask, Pixels, Selection, crop
 from ..base.camera import Camera
 from ..base.progress import Progress, part, silent
 from ..base.rotations import matrices_from_quats, quats_from_matrices
@@ -36,6 +36,8 @@ from ..document.model import (
 from ..document.paint import Paint
 from ..document.pose import Base, Pose
 from ..document.sides import Sides
+from ..document.transparency import continued
+from ..pictures.image import Picture
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width
 from . import LiftError, LiftSubject, lift_subject, load
@@ -344,6 +346,7 @@ class Background:
     plate: Plate
     others: Mask  # (H, W) what other objects hide of it
     inpaint: str  # backend that fills in what is missing
+    alpha: Pixels | None = None  # (H, W) of the photo, where it has one
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,7 +374,8 @@ def refit(
         return Refitted(matte, lifted, None)
     size = scene.mask.shape[::-1]
     before, after = (behind.others | _covered(one, size) for one in (was.matte, matte))
-    change = Uncovering(scene.pixels, behind.plate, before, after)
+    pixels = continued(Picture(scene.pixels, behind.alpha), before | after)
+    change = Uncovering(pixels, behind.plate, before, after)
     rest = part(progress, 0.9, 1.0)
     plate = refitted_plate(change, compose.load(behind.inpaint), rest, seed + 1)
     return Refitted(matte, lifted, plate)
@@ -383,7 +387,8 @@ def background_of(document: Document, k: int, inpaint: str) -> Background | None
         return None
     matte = document.objects[k].matte
     others = tuple(o for o in document.objects if o.matte is not matte)
-    return Background(document.plate, plate_cover(replace(document, objects=others)), inpaint)
+    covered = plate_cover(replace(document, objects=others))
+    return Background(document.plate, covered, inpaint, document.photo.picture.alpha)
 
 
 def _covered(matte: Matte, size: tuple[int, ...]) -> Mask:

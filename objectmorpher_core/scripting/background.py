@@ -33,14 +33,16 @@ class ShadowCaster:
 
     matte: Matte
     has_gone: bool  # it stands nowhere any more where that shadow falls
+    seen_from: float | None = None  # degrees above its ground, where that is said
 
     def is_like(self, other: ShadowCaster) -> bool:
         """Whether the shadow of the other one is the same, and what becomes of it."""
         one, two = self.matte, other.matte
         return (
-            (one.left, one.top, self.has_gone) == (two.left, two.top, other.has_gone)
+            (one.left, one.top) == (two.left, two.top)
+            and (self.has_gone, self.seen_from) == (other.has_gone, other.seen_from)
             and np.array_equal(one.alpha, two.alpha)
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,8 @@ class PlateTask:
     def run(self, progress: Progress) -> FoundBackground:
         """Find the shadows and fill in the background. Raises InpaintError."""
         shadows = tuple(
-            find_old_shadow(self.pixels, caster.matte, self.covered) for caster in self.casters
+            find_old_shadow(self.pixels, caster.matte, self.covered, caster.seen_from)
+            for caster in self.casters
         )
         found = zip(shadows, self.casters, strict=True)
         gone = [s for s, caster in found if s is not None and caster.has_gone]

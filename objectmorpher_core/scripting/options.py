@@ -115,6 +115,8 @@ def _handle(key: str, value: Any) -> HandleMove:
 
 
 def _source(key: str, value: Any) -> FillFrom:
+    if isinstance(value, FillFrom):
+        return value
     known = {"source", "to", "radius"}
     if not isinstance(value, dict) or not {"source", "to"} <= set(value) <= known:
         raise ScriptError(

@@ -387,8 +387,10 @@ def plate_task(document: Document, script: EditScript, casting: frozenset[int]) 
     """What there is to be done for the plate of a document; see `with_plate`."""
     casters = []
     for matte in _distinct(document, casting):
-        has_gone = not any(o.matte is matte and not has_left(o, document) for o in document.objects)
-        casters.append(ShadowCaster(matte, has_gone))
+        alike = [o for o in document.objects if o.matte is matte]
+        has_gone = all(has_left(o, document) for o in alike)
+        said = (o.seen_from for o in alike if o.seen_from is not None)
+        casters.append(ShadowCaster(matte, has_gone, next(said, None)))
     covered = plate_cover(document)
     return PlateTask(
         continued(document.photo.picture, covered), covered, tuple(casters), document.hints,
@@ -413,7 +415,7 @@ def begun_plate(
         return None
     matte = with_opacity(matte, document.photo.picture, document.objects[k].mask)
     item = replace(document.objects[k], matte=matte, is_visible=not script.remove)
-    item = replace(item, placement=_placement(script))
+    item = replace(item, placement=_placement(script), seen_from=script.seen_from)
     document = edits.set_hints(document, _hints(script, document.photo.size))
     document = document.with_object(k, item)
     casts = script.shadow == "auto" and has_left(item, document)

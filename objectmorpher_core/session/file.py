@@ -22,6 +22,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from ..base.arrays import same_values
 from ..base.camera import Camera
 from ..base.files import OutputError, reason_of, write_all
 from ..base.limits import PICTURE_PIXELS, SESSION_DOCUMENT, SESSION_OBJECTS
@@ -281,16 +282,28 @@ def _most_carried(objects: object) -> int:
 
 
 def _with_copies(document: Document) -> Document:
-    """Copies of an object share its mask, by which they are known as copies."""
+    """Copies of an object share its mask, cut-out and shape, by which they are known as copies."""
     known: dict[bytes, np.ndarray] = {}
-    objects = []
+    objects: list[EditObject] = []
     for item in document.objects:
         if item.mask is not None:
             key = hashlib.sha256(item.mask.data).digest() + repr(item.mask.shape).encode()
             mask = known.setdefault(key, item.mask)
             item = item if mask is item.mask else replace(item, mask=mask)
+        for other in objects:
+            if item.lifted is not None and other.mask is item.mask:
+                item = _sharing(item, other)
         objects.append(item)
     return replace(document, objects=tuple(objects))
+
+
+def _sharing(item: EditObject, other: EditObject) -> EditObject:
+    """`item` with the cut-out and the shape of `other` where they hold the same values."""
+    if same_values(other.matte, item.matte):
+        item = replace(item, matte=other.matte)
+    if same_values(other.lifted, item.lifted):
+        item = replace(item, lifted=other.lifted)
+    return item
 
 
 def _check(document: Document) -> None:

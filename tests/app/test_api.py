@@ -229,6 +229,8 @@ def test_the_selection_is_what_is_edited(folder):
     assert np.array_equal(_edit().selection, MASK)
     assert np.array_equal(_edit().lift().selection, MASK)
     assert np.array_equal(om.open(shapes.png(PIXELS)).mask(MASK).selection, MASK)
+    beside = om.open("photo.png").options(fov=60, mask="mask.png")
+    assert np.array_equal(beside.selection, MASK)
     clicked = om.open("photo.png").options(segment="grabcut").click(78, 62).selection
     assert (clicked & MASK).sum() / (clicked | MASK).sum() > 0.8
 

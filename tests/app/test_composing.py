@@ -20,11 +20,13 @@ from objectmorpher_core.compose.plate.plate import plate_cover, plate_picture
 from objectmorpher_core.compose.shadow.shadow import Shade
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
+from objectmorpher_core.document.placement import set_seen_from
 from objectmorpher_core.document.settings import (
     USUAL_SHARES,
     Finish,
     Shadow,
 )
+from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
 from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import press, stroke
@@ -220,6 +222,30 @@ def test_a_dragged_shadow_is_coarse_until_the_pointer_rests(editor: Editor, ball
         assert abs(a - b) < 20
 
 
+def test_a_shadow_follows_what_is_said_of_the_ground(editor: Editor, ball: Document) -> None:
+    document = edits.set_placement(ball, 0, Placement(move=(-20.0, 0.0)))
+    document = edits.set_shadow(document, 0, Shadow(strength=0.8))
+    steep = set_seen_from(document, 0, 80.0)
+    afresh = shade_of(editor, steep)
+    flat = shade_of(editor, set_seen_from(document, 0, 15.0))
+    again = shade_of(editor, steep)
+    assert afresh is not None and flat is not None and again is not None
+    assert again.bounds == afresh.bounds != flat.bounds
+
+
+def test_what_lies_under_clear_ground_is_no_shadow_and_no_background(
+    editor: Editor, ball: Document
+) -> None:
+    pixels, alpha = ball.photo.pixels.copy(), np.full(ball.photo.size[::-1], 255, np.uint8)
+    pixels[:8], alpha[:8] = (255, 0, 255), 0
+    photo = replace(ball.photo, picture=Picture(pixels, alpha))
+    editor.start(replace(ball, photo=photo))
+    assert editor.document is not None
+    looked_at = editor.old_shadows._cutout(editor.document, 0).pixels
+    np.testing.assert_array_equal(looked_at[8:], pixels[8:])
+    assert (looked_at[:8] != (255, 0, 255)).any(-1).all()
+
+
 def standing(shadow: np.ndarray | None) -> Document:
     return lifted_of(photo_of(shadow))
 
@@ -294,6 +320,15 @@ def test_a_shadow_that_would_stay_behind_is_offered_once_what_threw_it_is_moved(
         editor.poll()
     editor.apply("Move", edits.set_placement(editor.opened, 0, moved))
     wait_until(editor, lambda: editor.old_shadows.offer is not None)
+
+
+@pytest.mark.slow
+def test_a_shadow_is_looked_for_on_the_ground_that_is_said(editor: Editor) -> None:
+    document = set_seen_from(standing(None), 0, 45.0)
+    editor.start(document)
+    ground = editor.old_shadows._cutout(document, 0).ground
+    assert ground == pytest.approx(45.0, abs=0.5)
+    assert editor.composing.usual_ground == ground
 
 
 @pytest.mark.slow

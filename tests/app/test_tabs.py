@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import random
+import threading
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -196,6 +197,27 @@ def test_closing_asks_for_each_tab_and_quitting_once_for_all(tabs: Editor, tmp_p
     for name, x in (("a", 3.0), ("b", 4.0)):
         saved = decode_session((tmp_path / f"{name}.omorph").read_bytes())
         assert saved.objects[0].placement.move == (x, 0.0)
+
+
+@pytest.mark.parametrize("name", ["a.png", "no folder/a.omorph"])
+def test_keys_are_for_the_photo_again_where_a_session_is_not_saved(
+    tabs: Editor, tmp_path: Path, name: str
+) -> None:
+    go(tabs, tabs.tabs.all[0])
+    move(tabs, 3.0)
+    run(tabs, "quit")
+    tabs.filing.answer_save()
+    assert tabs.filing.wanted is Dialog.SAVE
+    tabs.filing.wanted = None
+    tabs.filing.choose(Dialog.SAVE, tmp_path / name)
+    wait_for_jobs(tabs)
+    assert tabs.message is not None and tabs.message.is_error and not tabs.is_over
+    is_done = threading.Event()
+    tabs.chores.start(
+        "Waiting", lambda progress: is_done.wait(), done=lambda _: None, failed=lambda _: None
+    )
+    assert not tabs.chores.is_idle and not tabs.filing.is_asking
+    is_done.set()
 
 
 def test_a_save_that_ends_in_another_tab_is_of_the_one_it_began_in(

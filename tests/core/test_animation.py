@@ -280,6 +280,7 @@ def test_key_poses_are_kept_changed_and_saved():
         if one.pose is not None and other.pose is not None:
             assert np.array_equal(one.pose.points, other.pose.points)
     assert np.array_equal(composite(at_key(opened, 2)).pixels, composite(document).pixels)
+    assert [is_at_key(opened, key) for key in range(3)] == [False, False, True]
 
     at_rest = at_key(document, 0)
     assert is_at_key(at_rest, 0) and not is_at_key(at_rest, 2)

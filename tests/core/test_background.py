@@ -38,6 +38,7 @@ HANDLE = [{"at": [75, 50], "to": [80, 45]}]
 EDITS = {
     "turn": {"turn": [20, 0, 0]},
     "move with its shadow": {"move": [20, 5]},
+    "move with its shadow, seen from above": {"move": [20, 5], "seen_from": 50},
     "spin": {"spin": 20},
     "spin and move": {"spin": 20, "move": [20, 5]},
     "removed": {"remove": True},

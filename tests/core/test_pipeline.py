@@ -244,6 +244,7 @@ def test_a_mask_wins_over_clicks():
     script = EditScript(click=((3.0, 3.0),))
     document = select(open_photo(PHOTO, "a.png"), script, MASK_PNG)
     assert np.array_equal(document.objects[0].mask, MASK)
+    assert document.objects[0].prompt.is_empty, "they did not choose it"
     assert dict(document.backends)["segment"] == "mask"
 
 

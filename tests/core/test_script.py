@@ -63,6 +63,11 @@ def test_a_script_in_a_file_says_the_same():
     assert item == BatchItem(script_from(FULL))
 
 
+def test_places_to_fill_from_may_be_those_of_another_script():
+    places = script_from(FULL).fill_from
+    assert len(places) == 2 and script_from({"fill_from": list(places)}).fill_from == places
+
+
 def test_a_move_without_depth_stays_at_its_depth():
     assert script_from({"move": [3, 4]}).move == (3.0, 4.0, 0.0)
 

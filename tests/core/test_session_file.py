@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import (
     Click,
@@ -118,6 +119,19 @@ def assert_equal(got, expected, where="document"):
 
 def test_round_trip(document):
     assert_equal(decode_session(encode_session(document)), document)
+
+
+def test_copies_are_copies_again(document):
+    """What only has the same mask is none."""
+    other = dataclasses.replace(document.objects[0].lifted, doubt=0.5)
+    document = edits.duplicate(edits.duplicate(document, 0), 0)
+    last = dataclasses.replace(document.objects[-1], lifted=other)
+    data = encode_session(document.with_object(len(document.objects) - 1, last))
+    loaded = decode_session(data)
+    own, _, copy, alien = loaded.objects
+    assert copy.mask is own.mask and copy.lifted is own.lifted and copy.matte is own.matte
+    assert alien.mask is own.mask and alien.lifted is not own.lifted
+    assert encode_session(loaded) == data
 
 
 def test_a_fresh_document(chelsea):

@@ -11,12 +11,14 @@ import pytest
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import turn_about, turn_matrix, vector_from_matrix
+from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document.model import EditObject
 from objectmorpher_core.document.placement import foot_of, gimbal_of
 from objectmorpher_core.pipeline import Edited, replay, run_script
 from objectmorpher_core.scripting.options import ScriptError
 from objectmorpher_core.scripting.script import BatchItem, parse_scripts
 from objectmorpher_core.session.file import decode_session, encode_session
+from objectmorpher_core.splat_files.meshes.textured import textured_glb
 from tests import shapes
 from tests.tree import over
 
@@ -147,6 +149,19 @@ def _foot(item: EditObject, edited: Edited) -> F64:
     assert lifted is not None
     points, down = lifted.world_points(lifted.body.means), gimbal_of(item, edited.document).down
     return foot_of(item.placement, points, lifted, edited.document.photo.camera, down)
+
+
+def test_a_further_object_may_have_its_shape_from_a_file(folder):
+    """The camera is the one in which the first was lifted."""
+    lone = _run(_item(move=[5, 0])).document
+    item = lone.objects[0]
+    path = folder / "left.glb"
+    path.write_bytes(textured_glb(item, puppet_of(item, lone.photo.camera)))
+    right = SMALL | {"mask": str(folder / "right.png"), "splats": str(path), "move": [2, 0]}
+    edited = _run(_item(move=[5, 0], objects=[right]))
+    _exact(edited)
+    assert edited.document.photo.camera == lone.photo.camera
+    assert edited.document.objects[1].lifted is not None
 
 
 def test_what_is_removed_shows_what_is_behind_it():

@@ -75,7 +75,7 @@ class Lights:
             if item.is_moved and item.is_visible and item.shadow.strength > 0:
                 caster = self._casters(
                     lambda own=own: lighting.caster(own.item, own.draft, horizon, is_sketch=True),
-                    own.draft, item.shadow, horizon, lighting,
+                    own.draft, item.shadow, item.seen_from, horizon, lighting,
                 )  # fmt: skip
                 if caster is not None:
                     found.append((own, caster))
@@ -102,8 +102,9 @@ class Lights:
             self._kept.pop(k, None)
             return NOTHING
         around = document.plate, document.horizon, document.depth
-        sources = (own.posed, item.shadow, *shares, item.finish, *around)
-        sources += tuple(part for o in others for part in (o.posed, o.item.shadow))
+        sources = (own.posed, item.shadow, item.seen_from, *shares, item.finish, *around)
+        for o in others:
+            sources += o.posed, o.item.shadow, o.item.seen_from
         kept, now = self._kept.get(k), time.monotonic()
         if kept is None or not same(kept.sources, sources):
             lit = self._work(document, own, is_hurried, near)()

@@ -182,6 +182,7 @@ class Editor(EditorState):
         self.hinting.forget()
         self.refining.forget()
         self.posing.forget()
+        self.keying.forget()
         self.posing.select(None)
 
     def quit(self) -> None:

@@ -236,14 +236,13 @@ class Filing:
     def answer_save(self) -> None:
         then, self.question = self.question, None
         if then is not None:
-            self._saves_all = True
             self._save_all(self.asked, then)
 
     def _save_all(self, tabs: tuple[Tab, ...], then: Callable[[], None]) -> None:
         """Saves one after another; where the user does not name a file, the rest is left."""
         left = tuple(tab for tab in tabs if not tab.is_saved)
+        self._saves_all = bool(left)
         if not left:
-            self._saves_all = False
             then()
             return
 
@@ -288,8 +287,13 @@ class Filing:
             usual, own = SESSION_ENDING, path.suffix
             sentence = t("a session's name ends in {usual}, not {own}", usual=usual, own=own)
             self._editor.complain(sentence)
+            self._end_saving()
             return
-        self._tasks.save(path, then)
+        self._tasks.save(path, then, self._end_saving)
+
+    def _end_saving(self) -> None:
+        """A file was not saved: the others are not either, and keys are for the photo again."""
+        self._saves_all = False
 
     def suggestion(self, dialog: Dialog) -> Path:
         """The file name a dialog begins with."""

@@ -458,8 +458,14 @@ class Tasks:
             done=accept, failed=self._editor.complain_of, is_quiet=True,
         )  # fmt: skip
 
-    def save(self, path: Path, then: Callable[[], None] | None = None) -> None:
-        """Writes the session, and goes on with `then` when it is on the disk."""
+    def save(
+        self, path: Path, then: Callable[[], None] | None = None,
+        give_up: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
+        """Writes the session, and goes on with `then` when it is on the disk.
+
+        `give_up` is called instead where it does not get there.
+        """
         editor, tab, history = self._editor, self._editor.tab, self._editor.history
         if history is None:
             return
@@ -478,15 +484,22 @@ class Tasks:
                              folder=folder_of(path)))  # fmt: skip
                 if then is not None:
                     then()
+            else:
+                give_up()
 
         def fail(error: JobError) -> None:
             end()
             if editor.tab is tab:
-                error = error.retried_by(lambda: self.save(path, then))  # as it is by then
+                error = error.retried_by(lambda: self.save(path, then, give_up))  # as it is then
             editor.complain_of(error)
+            give_up()
+
+        def stop() -> None:
+            end()
+            give_up()
 
         editor.jobs.start(
             t("Saving {name}", name=path.name), job_functions.write_session, step.document, path,
-            done=accept, failed=fail, cancelled=end, kind=f"{WRITE} {path}",
+            done=accept, failed=fail, cancelled=stop, kind=f"{WRITE} {path}",
         )  # fmt: skip
         tab.writing = step

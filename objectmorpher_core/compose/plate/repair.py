@@ -17,9 +17,10 @@ from ...base.arrays import F32, RGB, Mask, Pixels, crop, pixels_from_unit, unit_
 from ...base.masks import box_of, dilated
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Plate
+from ...document.transparency import continued
 from ...pictures.image import to_u8
 from .. import Inpainter
-from .plate import Box, correction, cut, fill_weight, hole_margin, plate_crop
+from .plate import Box, correction, cut, fill_weight, hole_margin, plate_cover, plate_crop
 
 RIM = 0.5  # x hole margin: the inpainter fills so much more, to compare with what is there
 CONTEXT = 0.6  # x the painted box's longer side, kept around it for the inpainter to copy from
@@ -51,7 +52,13 @@ def patch_of(document: Document, coverage: F32, box: Box) -> PlatePatch:
     around = _with_context(box, document.photo.size)
     left, top, right, bottom = around
     painted = coverage[top:bottom, left:right].copy()
-    return PlatePatch(left, top, plate_crop(document.photo.pixels, document.plate, around), painted)
+    return PlatePatch(left, top, plate_crop(_solid(document), document.plate, around), painted)
+
+
+def _solid(document: Document) -> Pixels:
+    """The photo's pixels (H, W, 3), without the colours that nobody sees under clear ground."""
+    picture = document.photo.picture
+    return picture.pixels if picture.alpha is None else continued(picture, plate_cover(document))
 
 
 def _with_context(box: Box, size: tuple[int, int]) -> Box:

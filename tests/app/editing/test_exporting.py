@@ -426,6 +426,16 @@ def test_key_poses_are_steps_and_become_a_film(moved: Editor) -> None:
     assert keying.count == 1
 
 
+def test_another_document_begins_with_its_first_key_pose(moved: Editor) -> None:
+    run(moved, "add_key")
+    run(moved, "add_key")
+    moved.apply("Move object", edits.set_placement(committed(moved), 0, Placement()))
+    run(moved, "add_key")
+    assert moved.keying.last == 2
+    moved.start(edits.set_placement(committed(moved), 0, Placement(move=(7.0, 0.0))))
+    assert moved.keying.shown is None and moved.keying.last == 0
+
+
 def committed(editor: Editor) -> Document:
     document = editor.committed
     assert document is not None

@@ -159,6 +159,9 @@ def test_a_script_that_moves_a_thing_takes_its_shadow_along():
     assert told["pixels"]["shadow"] > 300 > silent["pixels"]["shadow"]
     assert any("goes along" in n and "shadow none" in n for n in told["notes"])
     assert not silent["notes"]
+    said = run_script(photo, "a.png", script_from(script | {"seen_from": 45}), mask)
+    own = said.document.objects[0]
+    assert own.shadow.strength > 0.4 and own.grounded_shadow.ground == 45
     turned = run_script(
         photo, "a.png", script_from({**script, "move": [0, 0], "turn": [9, 0, 0]}), mask
     )

@@ -13,9 +13,11 @@ import pytest
 from PIL import Image
 
 from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.order import holes
 from objectmorpher_core.compose.plate.plate import plate_cover, plate_of_holes
+from objectmorpher_core.compose.plate.repair import fill_patch, margin_of, patch_of, with_patch
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
 from objectmorpher_core.document.settings import Shadow
@@ -26,6 +28,8 @@ from objectmorpher_core.document.transparency import (
     seen_plate,
     with_opacity,
 )
+from objectmorpher_core.lift.refitting import Lifted, background_of, refit
+from objectmorpher_core.lift.registration.imported import ImportTarget
 from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
 from objectmorpher_core.pipeline import lift_mask, make_plate, replay
 from objectmorpher_core.scripting.animation import Clip, frames
@@ -161,6 +165,48 @@ def test_colours_under_clear_ground_stay_beside_the_edit():
     assert far.any() and np.array_equal(result.pixels[far], pixels[far])
     assert np.array_equal(result.alpha[~result.footprint], picture.alpha[~result.footprint])
     assert result.outside_footprint_changed == 0
+
+
+@cache
+def _beside_clear_ground() -> Document:
+    """The same on opaque ground that ends beside it; magenta is what nobody sees."""
+    _, mask = _cut_out("hard")
+    is_clear = np.broadcast_to(np.arange(SIZE[0]) >= 175, mask.shape)
+    pixels = cv2.resize(photo("chelsea"), SIZE, interpolation=cv2.INTER_AREA)
+    pixels = np.where(is_clear[..., None], np.uint8([255, 0, 255]), pixels)
+    return _lifted(Picture(pixels, np.where(is_clear, 0, 255).astype(np.uint8)), mask)
+
+
+def _magenta(document: Document) -> int:
+    """How much of the picture is of the colour that nobody is to see."""
+    picture = composite(document)
+    assert picture.alpha is not None
+    red, green, blue = np.moveaxis(picture.pixels.astype(int), -1, 0)
+    return int(((red > green + 40) & (blue > green + 60) & (picture.alpha > 0)).sum())
+
+
+def test_a_repair_copies_nothing_from_under_clear_ground():
+    document = _moved(_beside_clear_ground(), (-40, 0))
+    coverage = np.zeros(SIZE[::-1], np.float32)
+    coverage[80:110, 160:175] = 1
+    patch = patch_of(document, coverage, (160, 80, 175, 110))
+    patch = fill_patch(patch, margin_of(document), load("telea"))
+    repaired = edits.set_plate(document, with_patch(document, patch, "telea"))
+    assert repaired.plate is not None and repaired.plate.painted is not None
+    assert _magenta(repaired) == _magenta(document) == 0
+
+
+def test_a_refined_mask_is_filled_behind_with_nothing_from_under_clear_ground():
+    document = _moved(_beside_clear_ground(), (-40, 0))
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]]
+    grown = document.objects[0].mask | ((np.abs(x - 164) < 10) & (np.abs(y - 93) < 14))
+    changed = edits.change_mask(document, 0, grown)
+    item, opened = changed.objects[0], changed.photo
+    was = Lifted(item.shaped, item.matte, item.lifted, item.shape)
+    scene = ImportTarget(opened.pixels, opened.camera, item.selection)
+    answer = refit(was, scene, background_of(changed, 0, "telea"))
+    refitted = edits.refit(changed, 0, answer.matte, answer.lifted, answer.plate)
+    assert (refitted.plate.hole.sum() > document.plate.hole.sum()) and _magenta(refitted) == 0
 
 
 def test_behind_an_object_the_alpha_around_it_goes_on():

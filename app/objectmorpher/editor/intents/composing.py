@@ -328,6 +328,13 @@ class Composing:
         editor = self._editor
         return seen_from(editor.opened, editor.current, shadow)
 
+    @property
+    def usual_ground(self) -> float:
+        """Return the same angle for a current object whose shadow has no ground of its own."""
+        item = self._editor.chosen
+        plain = replace(item, shadow=replace(item.shadow, ground=None))
+        return self.ground(plain.grounded_shadow)
+
     def toggle_shadow(self) -> None:
         """Gives the current object a shadow, or takes it."""
         item = self._item

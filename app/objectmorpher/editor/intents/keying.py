@@ -20,6 +20,10 @@ class Keying:
         self._editor, self._posing = editor, posing
         self._last = 0
 
+    def forget(self) -> None:
+        """Another document is shown."""
+        self._last = 0
+
     @property
     def count(self) -> int:
         """How many key poses there are."""

@@ -19,6 +19,7 @@ from objectmorpher_core.base.arrays import Mask, crop
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
 from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.transparency import continued
 
 from ...canvas.memo import same
 from ...system.texts import t
@@ -207,10 +208,11 @@ class OldShadows:
         """A lifted object, and what there is to be known of its ground."""
         item = document.objects[k]
         assert item.matte is not None, "it is lifted"
-        is_known = item.shadow.ground is not None or document.horizon is not None
-        ground = seen_from(document, k, item.shadow) if is_known else None
+        shadow = item.grounded_shadow
+        is_known = shadow.ground is not None or document.horizon is not None
+        ground = seen_from(document, k, shadow) if is_known else None
         covered = self._editor.derived.hidden(document)
-        return Cutout(document.photo.pixels, item.matte, covered, ground)
+        return Cutout(continued(document.photo.picture, covered), item.matte, covered, ground)
 
     def _suggest(self, offer: ShadowOffer) -> None:
         """Offers what was found unasked, where nothing else is offered."""
@@ -236,7 +238,6 @@ class OldShadows:
 
 def _offer_of(document: Document, k: int, answer: tuple[Shadow, Plate]) -> ShadowOffer:
     shadow, plate = answer
-    ground = document.objects[k].shadow.ground
-    if ground is not None or document.horizon is not None:  # it was known how one looks at it
-        shadow = replace(shadow, ground=ground)
+    if shadow.ground is None:  # it was known how one looks at it
+        shadow = replace(shadow, ground=document.objects[k].shadow.ground)
     return ShadowOffer(document, k, shadow, plate)

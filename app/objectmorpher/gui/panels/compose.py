@@ -189,7 +189,7 @@ def _draw_shadow(editor: Editor) -> None:
         change = number_field(number, unit * getattr(shadow, name))
         changed = replace(shadow, **{name: change.value / unit})
         take(editor, change, lambda changed=changed: preview(changed), t("Shape of shadow"))
-    usual, ground = editor.composing.ground(replace(shadow, ground=None)), shadow.ground
+    usual, ground = editor.composing.usual_ground, shadow.ground
     number = Number(t("Ground"), "%.0f°", 0.5, 5.0, usual, 0.0, 90.0)
     change = number_field(number, usual if ground is None else ground)
     tooltip(t("How steeply you look down on the ground: 0° along it, 90° from above"))
