@@ -342,12 +342,15 @@ def test_what_is_given_back_of_a_texture_is_no_row_of_its_halved_copies(height):
     """Whatever its height, of which the last strip is a part only."""
     rng = np.random.default_rng(height)
     colours, alpha = (rng.random(shape, np.float32) for shape in ((height, 512, 3), (height, 512)))
-    source = TextureSource(lambda a, b: (colours[a:b], alpha[a:b]), (height, 512), 0.0, 0.0)
+    top = float(rng.integers(-200, 200))
+    source = TextureSource(lambda a, b: (colours[a:b], alpha[a:b]), (height, 512), 0.0, top)
     rows = TextureRows(source)
-    rows.looked_at(np.array([height - 2.0]), np.array([height - 1.0]))
-    seen = rows.looked_at(np.array([0.0]), np.array([1.0]))
-    for own, whole in zip(seen.levels[1:], source.levels().levels[1:], strict=True):
+    rows.looked_at(top + np.array([height - 2.0]), top + np.array([height - 1.0]))
+    seen = rows.looked_at(top + np.array([20.0]), top + np.array([30.0]))
+    full, *halved = source.levels().levels
+    for own, whole in zip(seen.levels[1:], halved, strict=True):
         np.testing.assert_array_equal(own, whole)
+    np.testing.assert_array_equal(seen.levels[0][14:36], full[14:36])
 
 
 def test_a_texture_is_there_by_rows_from_its_area_on(monkeypatch):
