@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from skimage import data
 
@@ -155,6 +155,7 @@ def test_nothing_has_no_fringe():
 
 
 @given(st.integers(0, 10**6), st.floats(0, 3), st.floats(1, 1.1))
+@settings(deadline=None)  # its kernel is compiled first
 def test_a_patch_that_is_farther_off_than_the_best_is_never_taken_for_as_near(seed, share, luck):
     """Its comparison ends early, whatever it costs besides and is worth by chance."""
     rng = np.random.default_rng(seed)
