@@ -568,7 +568,6 @@ class Document:
 
 
 # Whether two edits look the same: then a refinement of one is one of the other, too.
-#
 # Of an object, what its picture depends on; what else changes leaves a refinement as it is.
 SHOWN = (
     "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
@@ -594,11 +593,7 @@ def is_shown_alike(one: EditObject, other: EditObject) -> bool:
 
 def show_the_same(one: Document, other: Document) -> bool:
     """Whether a refinement of one edit is one of the other, too."""
-    if one.photo is not other.photo or one.plate is not other.plate:
-        return False
-    if (one.horizon, one.feather) != (other.horizon, other.feather):
-        return False
     own, others = ([o for o in d.objects if o.matte is not None] for d in (one, other))
-    if one.depth is not other.depth or len(own) != len(others):
-        return False
-    return all(map(is_shown_alike, own, others))
+    alike = one.photo is other.photo, one.plate is other.plate, one.depth is other.depth
+    alike = *alike, one.horizon == other.horizon, one.feather == other.feather
+    return all(alike) and len(own) == len(others) and all(map(is_shown_alike, own, others))

@@ -145,8 +145,8 @@ def _filled(
         """What of the square is the crop, be it between its pixels."""
         there = np.column_stack([np.diag(step), start])
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        part = cv2.warpAffine(square, there, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray(part, np.float32)
+        own = cv2.warpAffine(square, there, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(own, np.float32)
 
     invented = inner(np.where(is_known[..., None], guess, answer) * np.float32(255))
     unknown = inner((~is_known).astype(np.float32)) > 0

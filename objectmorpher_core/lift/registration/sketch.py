@@ -118,7 +118,7 @@ def _details(pixels: Pixels, mask: Mask) -> tuple[F64, F32]:
     warp[:, 2] = zoom * (0.5 - corner) - 0.5
     grey = cv2.cvtColor(to_u8(pixels), cv2.COLOR_RGB2GRAY)
     own = np.where(mask, grey, np.uint8(grey[mask].mean()))  # no background, no edge beyond it
-    if zoom < 1:  # no warp of OpenCV's takes means
+    if zoom < 1:  # a warp of OpenCV looks at single pixels, whatever they are of
         own = cv2.GaussianBlur(own, (0, 0), ALIASED / zoom)
     way = cv2.INTER_CUBIC if zoom > 1 else cv2.INTER_LINEAR
     own = cv2.warpAffine(own, warp, (SIDE, SIDE), flags=way, borderMode=cv2.BORDER_REPLICATE)

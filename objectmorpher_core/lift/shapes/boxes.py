@@ -70,12 +70,12 @@ def fit_box(evidence: Evidence, hopeless: float = np.inf) -> tuple[Mesh, Misfit]
     guesses.sort(key=lambda guess: _cost(guess, evidence)(np.zeros(9)))
     costs = [_cost(guess, evidence) for guess in guesses[:KEPT]]
     fits = all_least(costs, [np.zeros(9)] * len(costs), STEPS)
-    best = int(np.argmin([cost(numbers) for cost, numbers in zip(costs, fits, strict=True)]))
-    numbers = fits[best]
-    mesh = guesses[best](numbers)
+    best = min(range(len(fits)), key=lambda k: costs[k](fits[k]))
+    build, numbers = guesses[best], fits[best]
+    mesh = build(numbers)
     if (misfit := evidence.misfit(mesh)).total > hopeless:
         return mesh, misfit
-    finer = guesses[best](_outlined(guesses[best], numbers, evidence))
+    finer = build(_outlined(build, numbers, evidence))
     is_better = (found := evidence.misfit(finer)).total < misfit.total + WORSE
     return (finer, found) if is_better else (mesh, misfit)
 

@@ -17,7 +17,7 @@ RINGS = 14  # of a ball; of one that is shown so many times more as it has corne
 
 
 def cross(one: F64, other: F64) -> F64:
-    """The cross products of (..., 3) and (..., 3); numpy's own takes ten times as long for few."""
+    """The cross products of (..., 3) and (..., 3): of few, in less than half of numpy's time."""
     a, b, c = one[..., 0], one[..., 1], one[..., 2]
     x, y, z = other[..., 0], other[..., 1], other[..., 2]
     return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)

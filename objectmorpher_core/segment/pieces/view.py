@@ -60,7 +60,7 @@ class PieceView:
             salience = np.asarray(cv2.resize(salience, size), np.float32)
         self.ground = PieceGround(pieces, salience, is_of_large, embedding.tokens)
         self._image = reduced(rgb)
-        self._known: dict[tuple[Prompt, int | None], PieceAnswer] = {}  # and by the whole
+        self._known: dict[tuple[Prompt, int | None], PieceAnswer] = {}  # by whole, too
         self._choices: dict[Prompt, PieceChoice] = {}
 
     def answer(self, prompt: Prompt, whole: Mask | None, progress: Progress) -> PieceAnswer:
