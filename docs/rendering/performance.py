@@ -58,7 +58,7 @@ Of the first edit of *enlarged*, a process of its own, 7.0 s of the processors i
 | filling in behind it, selecting, drawing, writing, the rest | 1.8 |
 
 A living thing takes longer: the samples' astronaut and cat, as large, take 5.1 s (8.9 of the
-processors), and 2.9 s again. They have sides to be invented, and are compared with solids, of which
+processors), and 3.4 s again. They have sides to be invented, and are compared with solids, of which
 the cup is one at once.
 
 The photo is encoded while the rest of the program is imported, and the background is filled in

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...base.arrays import F32, RGB, Mask, Pixels
-from ...base.masks import dilated, opened
+from ...base.masks import dilated
 from ...base.threads import in_threads
 from ..selection import box_around
 from .closed_form import Expected, solve_alpha
@@ -288,7 +288,9 @@ def _beside_edge(rgb: RGB, mask: Mask, off: float) -> list[Mask]:
     found = _wide(picture, mask, off)
     lab = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2LAB), np.float32) / np.float32(100)
     contrast, far = _contrast(lab), max(int(BESIDE_PIECE * off), 1)
-    differs = opened(found != mask).astype(np.uint8)
+    differs = cv2.morphologyEx(
+        (found != mask).astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8)
+    )
     _, labels, stats, _ = cv2.connectedComponentsWithStats(differs, connectivity=4)
     large = stats[:, cv2.CC_STAT_AREA] >= SMALLEST * np.count_nonzero(mask)
     pieces = []
