@@ -13,6 +13,7 @@ from ..base.camera import Camera
 from ..document.model import Document, EditObject, Matte
 from ..document.placement import down_of
 from ..raster.posed import PosedSplats
+from .light.defocus import reach_of
 from .plate.plate import hole_margin
 
 MOSTLY = 0.5  # of a moved object: what hides more of it is hardly what was meant to
@@ -241,7 +242,7 @@ def _reach(document: Document, k: int, splats: PosedSplats) -> Bounds:
         x1, y1 = max(x1, float(x.max()) + edge), max(y1, float(y.max()) + edge)
     elif item.is_visible:
         x0, y0, x1, y1 = -np.inf, -np.inf, np.inf, np.inf
-    margin = hole_margin(camera.width, camera.height)
+    margin = hole_margin(camera.width, camera.height) + reach_of(item.finish.blur)
     if item.is_visible and item.shadow.strength > 0:  # which may fall on what it comes near
         margin += (item.shadow.length + SHADOW) * max(x1 - x0, y1 - y0)
     return x0 - margin, y0 - margin, x1 + margin, y1 + margin

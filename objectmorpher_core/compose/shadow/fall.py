@@ -31,7 +31,7 @@ FLAT = 0.06  # x the caster's height: what rises less is the ground
 FARTHEST = 40.0  # x as far as the foot: no shadow is seen there
 LOOKED = 24  # places across the ground before a foot, and as many along it
 EIGHTH = 8  # one point in so many is enough to find where a shadow is
-ROOM = 0.15  # x the caster's height, around those
+ROOM = 0.15  # x the caster's height, around those at least
 FEWEST = 4  # Gaussians that must be seen there
 
 
@@ -140,7 +140,8 @@ class Caster:
     def _box(self) -> tuple[tuple[float, float], tuple[float, float]] | None:
         """Around most of what lies between the object and where its shadow falls, photo px."""
         few = self.standing.lit(self.shadow)[::EIGHTH]
-        return box_around(few, self.standing.camera, ROOM * self.standing.height)
+        room = max(ROOM, self.standing.room(self.shadow))
+        return box_around(few, self.standing.camera, room * self.standing.height)
 
     def _beside(self, points: F64) -> float | None:
         """X its distance, how far away another object is; None where it has no ground with this."""

@@ -152,10 +152,15 @@ class StandingObject:
         evenly = float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(points)))
         pitch = max((right - left) / cells, (bottom - top) / cells, evenly, 1.0)
         pitch = max(pitch / CRISP, 1.0) if shadow.ground == FROM_ABOVE else pitch
-        blur = max(BLURS[-1] * shadow.softness, LAST_BLURS[1], BAND_BLUR)
-        room = 3 * blur * self._size + 4 * pitch
+        room = self.room(shadow) * self._size + 4 * pitch
         width, height = (int(np.ceil((a + 2 * room) / pitch)) for a in (right - left, bottom - top))
         return SilhouetteGrid(left - room, top - room, pitch, width, height)
+
+    def room(self, shadow: Shadow) -> float:
+        """X its height, how far the blur of its shadow reaches."""
+        if shadow.ground == FROM_ABOVE:
+            return 3 * last_blur(shadow) * max(self._side / self.height, 1.0)
+        return 3 * max(BLURS[-1] * shadow.softness, LAST_BLURS[1], BAND_BLUR)
 
     def far(self, shadow: Shadow, grid: SilhouetteGrid, level: float = 0.0) -> F32:
         """(h, w) of the light, what the whole object takes, in [0, 1].
@@ -266,27 +271,47 @@ def smooth(values: F32, across: float, down: float | None = None) -> F32:
 
     `across`, `down`: standard deviations, px; both the same where one is given.
     """
-    size = (2 * round(across) + 1, 2 * round(across if down is None else down) + 1)
+    return _boxes(_boxes(values, across, 1, 0), across if down is None else down, 0, 1)
+
+
+def _boxes(values: F32, sigma: float, across: int, down: int) -> F32:
+    """Three boxes along one direction that together have that standard deviation, px.
+
+    Each is the mean of the next smaller and the next larger of odd width that has the variance
+    of a third, for a width of whole pixels would let the blur go in steps.
+    """
+    least = max(int((np.sqrt(4 * sigma**2 + 1) - 1) / 2), 0)
+    narrow, wide = 2 * least + 1, 2 * least + 3
+    share = (4 * sigma**2 + 1 - narrow**2) / (wide**2 - narrow**2)
     for _ in range(3):
-        blurred = cv2.blur(values, size, borderType=cv2.BORDER_CONSTANT)
-        values = np.asarray(blurred, np.float32)
-    return values
+        less, more = (
+            cv2.blur(
+                values, (1 + across * (n - 1), 1 + down * (n - 1)), borderType=cv2.BORDER_CONSTANT
+            )
+            for n in (narrow, wide)
+        )
+        values = cv2.addWeighted(less, 1 - share, more, share, 0)
+    return np.asarray(values, np.float32)
 
 
 def _spread(points: F64, values: F64, grid: SilhouetteGrid, camera: Camera) -> tuple[F32, F32]:
-    """What world points (N, 3) cover of a grid (h, w) in [0, 1], and the mean of their values."""
+    """What world points (N, 3) cover of a grid (h, w) in [0, 1], and the mean of their values.
+
+    Holes between them are closed; what is thin stays thin.
+    """
     index, is_there = grid.cells(points, camera)
     shape, cells = (grid.height, grid.width), grid.width * grid.height
     count, total = (
-        cv2.blur(
-            np.bincount(index, weight, cells).reshape(shape).astype(np.float32), (3, 3),
-            borderType=cv2.BORDER_CONSTANT,
-        )
+        np.bincount(index, weight, cells).reshape(shape).astype(np.float32)
         for weight in (None, values[is_there])
+    )
+    near, total = (cv2.blur(a, (3, 3), borderType=cv2.BORDER_CONSTANT) for a in (count, total))
+    usual = float(np.median(near.ravel()[index])) if len(index) else 1.0
+    cover = cv2.morphologyEx(
+        np.clip(2 * count / usual, 0, 1), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8),
+        borderType=cv2.BORDER_CONSTANT, borderValue=0,
     )  # fmt: skip
-    usual = float(np.median(count[count > 0])) if len(index) else 1.0
-    cover = np.clip(2 * count / usual, 0, 1)
-    return np.asarray(cover, np.float32), np.asarray(total / np.maximum(count, 1e-6), np.float32)
+    return np.asarray(cover, np.float32), np.asarray(total / np.maximum(near, 1e-6), np.float32)
 
 
 def _outline(points: F64, grid: SilhouetteGrid, camera: Camera) -> F32:

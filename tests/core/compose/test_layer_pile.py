@@ -103,7 +103,7 @@ def test_a_shadow_is_a_layer_of_its_own():
 def test_a_shadow_on_another_thing_is_in_its_layer():
     resting = shapes.scene("disc").document()
     document = edits.set_placement(
-        edits.duplicate(resting, 0), 1, Placement(move=(-45.0, 35.0), scale=0.5)
+        edits.duplicate(resting, 0), 1, Placement(move=(-45.0, 35.0), scale=0.55)
     )
     shaded = edits.set_shadow(document, 1, Shadow(1.0, -40.0, 1.5, 0.1))
     difference, pixels, _ = off(shaded)

@@ -111,6 +111,14 @@ def test_an_object_at_rest_far_from_what_moves_is_not_drawn():
     assert _order(document) == []
 
 
+def test_what_is_blurred_reaches_as_far_as_its_blur():
+    document = _moved(_two_discs(), 0, Placement(move=(60.0, 0.0)))
+    assert _order(document) == [0]
+    item = document.objects[0]
+    blurred = replace(item, finish=replace(item.finish, blur=30.0))
+    assert len(_order(replace(document, objects=(blurred, document.objects[1])))) == 2
+
+
 def test_the_edge_of_an_object_at_rest_is_kept_beside_a_hole():
     """The plate is without both objects: beside the hole it would show through the edge."""
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5

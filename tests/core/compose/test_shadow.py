@@ -6,15 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import stand
 from objectmorpher_core.compose.shadow.fall import Caster
 from objectmorpher_core.compose.shadow.shadow import (
+    FINE,
+    FlatShadow,
     Shade,
     StandingObject,
     opacity,
+    smooth,
 )
 from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits
@@ -93,6 +98,45 @@ def test_the_contact_is_right_below_the_object():
     assert shade is not None
     row = int(np.argmax(shade.alpha.max(1))) + 0.5 + shade.top
     assert abs(row - FOOT[1]) < 6
+
+
+def test_what_is_thin_takes_as_much_light_for_its_width():
+    taken, sharp = [], Shadow(1.0, 70.0, 2.0, 0.0, 0.0)
+    for wide in (4, 8, 40):
+        mask = np.zeros((200, 260), bool)
+        mask[54:114, 104 : 104 + wide] = True
+        own = standing(mask, CAMERA)
+        grid = own.grid(sharp)
+        assert grid is not None
+        taken.append(float(own.far(sharp, grid).sum()) * grid.pitch**2 / wide)
+    assert taken[:2] == pytest.approx([taken[2]] * 2, rel=0.15)
+
+
+@given(st.floats(0, 15), st.floats(0, 15))
+def test_a_shadow_is_blurred_by_as_much_as_asked(across: float, down: float):
+    dot = np.zeros((121, 121), np.float32)
+    dot[60, 60] = 1
+    blurred, away = smooth(dot, across, down).astype(np.float64), np.arange(-60.0, 61)
+    spread = [np.sqrt(max(blurred.sum(axis) @ away**2, 0)) for axis in (0, 1)]
+    assert blurred.sum() == pytest.approx(1, abs=1e-4)
+    assert spread == pytest.approx([across, down], abs=1e-2)
+
+
+@pytest.mark.parametrize("ground", [20.0, 90.0])
+@pytest.mark.parametrize("softness", [0.0, 0.5, 1.0])
+def test_a_soft_shadow_of_what_lies_flat_is_not_cut_off(ground: float, softness: float):
+    """A sheet that hardly rises from the ground."""
+    place = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 80), np.linspace(-0.5, 0.5, 80)), -1)
+    normal = ground_normal(CAMERA, None, ground, CAMERA.cy)
+    assert normal is not None
+    sheet = place[..., :1] * [1.0, 0, 0] + place[..., 1:] * np.cross(normal, [1.0, 0, 0])
+    points = np.concatenate([sheet.reshape(-1, 3) - h * normal for h in (0.0, 0.04)])
+    own = StandingObject(points + [0.0, 0.0, 4.0], normal, Camera.from_fov(1040, 800))
+    flat = FlatShadow.of(Shadow(1.0, 30.0, 0.5, softness, 0.0, ground=ground), own, FINE)
+    assert flat is not None
+    alpha = flat.alpha
+    ends = [float(edge.max()) for edge in (alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1])]
+    assert alpha.max() > 0.5 and max(ends) == 0
 
 
 @pytest.mark.parametrize("ground", [10.0, 30.0, 60.0])
