@@ -49,7 +49,7 @@ def find_axis(canvas: ReliefCanvas) -> MirrorAxis:
     solid = np.asarray(cv2.resize(canvas.whole, size, interpolation=area), np.float32)
     shown = np.asarray(cv2.resize(canvas.alpha, size, interpolation=area), np.float32)
     small = cv2.resize(canvas.foreground, size, interpolation=area)
-    scale /= canvas.step
+    scales = size / (canvas.step * np.array(canvas.alpha.shape[::-1]))  # both are rounded
     colour = np.asarray(cv2.GaussianBlur(small, (0, 0), 1.0), np.float32)
     picture = np.dstack([colour, shown])
     y, x = np.mgrid[: size[1], : size[0]] + 0.5
@@ -63,7 +63,7 @@ def find_axis(canvas: ReliefCanvas) -> MirrorAxis:
             offset = float(normal @ middle + shift * 4 * spread)
             warp = _reflection(normal, offset)
             trials.append((_overlap(solid, warp), normal, offset, warp))
-    best = MirrorAxis((1.0, 0.0), left + middle[0] / scale, 0.0, -1.0)
+    best = MirrorAxis((1.0, 0.0), left + middle[0] / scales[0], 0.0, -1.0)
     highest = -1.0
     for overlap, normal, offset, warp in sorted(trials, key=lambda trial: -trial[0]):
         if 2 * overlap <= highest:
@@ -71,8 +71,11 @@ def find_axis(canvas: ReliefCanvas) -> MirrorAxis:
         likeness = _likeness(picture, warp)
         if overlap * (1 + likeness) > highest:
             highest = overlap * (1 + likeness)
-            in_photo = offset / scale + float(normal @ [left, top])
-            best = MirrorAxis((float(normal[0]), float(normal[1])), in_photo, overlap, likeness)
+            across = normal * scales
+            length = float(np.linalg.norm(across))
+            x, y = (across / length).tolist()
+            in_photo = offset / length + x * left + y * top
+            best = MirrorAxis((x, y), in_photo, overlap, likeness)
     return best
 
 

@@ -249,7 +249,7 @@ def at_edge(first: Rim, lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) ->
                            wider[:, None] * -(np.stack(tilt, 1) @ ring)], -1)  # fmt: skip
         places = lip.centre + lip.radius * (places @ np.stack([across, down, lip.normal]))
         at = places[..., :2] / places[..., 2:] * camera.focal + [camera.cx, camera.cy]
-        at = np.rint((at - corner) * scale).astype(int).clip(0, most)
+        at = np.floor((at - corner) * scale).astype(int).clip(0, most)
         seen = blurred[at[..., 1], at[..., 0]].mean(1)
         likely = seen - USUAL * (((trials - still) / FREE) ** 2).sum(1)
         best = trials[int(np.argmax(likely))]
@@ -278,7 +278,7 @@ def _edges_around(lip: Rim, pixels: Pixels, mask: Mask, camera: Camera) -> tuple
     low = np.clip(np.floor(corner - margin), 0, [camera.width - 1, camera.height - 1])
     high = np.clip(np.ceil(corner + 2 * reach + margin), low + 1, [camera.width, camera.height])
     (x0, y0), (x1, y1) = low.astype(int), high.astype(int)
-    (left, top), wide = scale * (low - corner), (max(int(2 * reach * scale), 1),) * 2
+    (left, top), wide = scale * (low + 0.5 - corner) - 0.5, (max(int(2 * reach * scale), 1),) * 2
     warp = np.array([[scale, 0, left], [0, scale, top]])
     how = cv2.INTER_AREA if scale == 1 else cv2.INTER_LINEAR
     smooth = cv2.GaussianBlur(to_u8(pixels[y0:y1, x0:x1]), (0, 0), blur)

@@ -89,6 +89,16 @@ def test_a_photo_of_another_size_has_the_same_axis():
     assert three.normal == one.normal
 
 
+@over("width", [60, 100, 150, 210, 400])
+def test_the_axis_is_in_the_middle_whatever_the_width(width):
+    """It is looked for in a smaller picture, whose sides are whole px."""
+    tall = (width, 1000)
+    alpha, rgb = (cv2.resize(p, tall) for p in (_body(), _symmetric(_noise(1))))
+    axis = find_axis(ReliefCanvas.of(Matte(30, 0, np.asarray(alpha), np.asarray(rgb))))
+    assert axis.normal == (1.0, 0.0)
+    assert axis.offset == pytest.approx(30 + width / 2, abs=0.1)
+
+
 def test_a_mirror_image_of_a_mirror_image_is_the_place_itself():
     axis = MirrorAxis((float(np.cos(0.3)), float(np.sin(0.3))), 40.0, 1.0, 1.0)
     xy = np.random.default_rng(0).uniform(0, 100, (5, 7, 2))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.fusion import fused
@@ -130,25 +131,47 @@ def test_beside_a_cup_its_saucer_has_colours_of_its_own() -> None:
     assert surface.is_seen[clear].mean() > 0.9
 
 
-def test_a_lip_is_where_the_photo_has_its_edge_also_off_the_saucers_middle() -> None:
+@pytest.fixture(scope="module")
+def cup_on_saucer():
+    return see(_both())[0]
+
+
+def _lips(seen, camera: Camera, aside: float, radius: float) -> tuple[Rim, Rim, Rim]:
+    """A lip beside the saucer's axis: as it is, as first guessed, and as found by its edge."""
     across = np.cross(UP, [0.0, 0.0, 1.0])
-    aside = 0.02 * across / np.linalg.norm(across)
-    seen, _ = see(_both())
-    _, camera = body_of(seen)
-    first, true = Rim(AT, UP, 0.34), Rim(AT + 0.24 * UP + aside, UP, 0.15)
-    lip = Rim(AT + 0.24 * UP, UP, 0.14)  # as about the saucer's axis
+    middle = AT + 0.24 * UP + aside * across / np.linalg.norm(across)
+    true, lip = Rim(middle, UP, radius), Rim(AT + 0.24 * UP, UP, radius * 14 / 15)
     rows, columns = np.indices(seen.mask.shape) + 0.5
     tangents = np.stack([columns - camera.cx, rows - camera.cy], -1) / camera.focal
     grey = np.where(true.outside(tangents) < 0, 230, np.where(seen.mask, 120, 40))
     pixels = grey.astype(np.uint8)[..., None].repeat(3, 2)
+    return true, lip, at_edge(Rim(AT, UP, 0.34), lip, pixels, seen.mask, camera)
+
+
+def test_a_lip_is_where_the_photo_has_its_edge_also_off_the_saucers_middle(cup_on_saucer) -> None:
+    seen = cup_on_saucer
+    _, camera = body_of(seen)
+    true, lip, found = _lips(seen, camera, 0.02, 0.15)
+    rows, columns = np.indices(seen.mask.shape) + 0.5
+    tangents = np.stack([columns - camera.cx, rows - camera.cy], -1) / camera.focal
     on_lip = tangents[np.abs(true.outside(tangents) * true.centre[2]) < 0.005 * true.radius]
 
     def off(rim: Rim) -> float:
         return float(np.abs(rim.outside(on_lip)).max() * rim.centre[2] / rim.radius)
 
-    found = at_edge(first, lip, pixels, seen.mask, camera)
     assert off(found) < min(0.08, 0.4 * off(lip))
     assert found.normal @ UP > np.cos(np.radians(6.0))
+
+
+def test_lips_are_no_half_pixel_beside_their_edges(cup_on_saucer) -> None:
+    _, camera = body_of(cup_on_saucer)
+    shifts = []
+    for aside in (-0.02, -0.01, 0.01, 0.02):
+        for radius in (0.12, 0.15, 0.17):
+            true, _, found = _lips(cup_on_saucer, camera, aside, radius)
+            ends = [rim.centre[:2] / rim.centre[2] * camera.focal for rim in (found, true)]
+            shifts.append(ends[0] - ends[1])
+    assert np.abs(np.mean(shifts, 0)).max() < 0.3  # px
 
 
 def test_an_egg_has_no_rim() -> None:
