@@ -352,6 +352,7 @@ def number_field(number: Number, value: float) -> FieldChange:
         "##value", shown, number.speed, number.low, number.high, number.format, int(flags)
     )
     mark(number.name)
+    _select_all_of_double_clicked()
     if is_changed or imgui.is_item_deactivated_after_edit():
         changed = FieldChange(new, is_changed, imgui.is_item_deactivated_after_edit())
     for sign, icon in ((-1, Icon.MINUS), (1, Icon.PLUS)):
@@ -363,6 +364,14 @@ def number_field(number: Number, value: float) -> FieldChange:
             changed = FieldChange(stepped, True, True)
     imgui.pop_id()
     return changed
+
+
+def _select_all_of_double_clicked() -> None:
+    """A double-click selects the number that is typed over, not what is behind its point."""
+    typed = imgui.internal.get_input_text_state(imgui.get_item_id())
+    if typed is not None and imgui.is_item_active() and imgui.is_mouse_double_clicked(0):
+        typed.select_all()
+        typed.selected_all_mouse_lock = True  # until the button is let go
 
 
 def _stepper(icon: str) -> bool:
