@@ -15,6 +15,7 @@ from editor_steps import CENTRE, HEIGHT, WIDTH, wait_for_jobs, wait_until
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
+from objectmorpher.editor.refits import REFIT
 from objectmorpher.editor.tasks import READY, Combine, Question
 from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
@@ -231,6 +232,19 @@ def test_the_shape_follows_a_step_that_was_undone_while_it_was_made_ready(
     run(editor, "redo")
     wait_until(editor, lambda: editor.object.shaped is None)
     assert editor.history.undo_label == "Grow selection"
+
+
+def test_what_is_undone_is_fitted_no_longer_and_once_more_when_it_is_redone(
+    editor: Editor, ball: Document
+) -> None:
+    _moved_ball(editor, ball, 50.0, -6.0)
+    run(editor, "grow")
+    wait_until(editor, lambda: editor.jobs.is_busy(REFIT))
+    run(editor, "undo")
+    editor.poll()
+    assert not editor.jobs.is_busy(REFIT), "it is asked to stop"
+    run(editor, "redo")
+    wait_until(editor, lambda: editor.object.shaped is None)
 
 
 @pytest.mark.slow

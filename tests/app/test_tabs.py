@@ -85,6 +85,16 @@ def test_going_from_tab_to_tab_changes_no_document(tabs: Editor) -> None:
     assert first.is_saved
 
 
+def test_painting_goes_on_in_the_tab_that_it_began_in_only(tabs: Editor) -> None:
+    first, second, _ = tabs.tabs.all
+    go(tabs, first)
+    tabs.view.compose.is_painting, tabs.view.compose.source = True, (12.0, 30.0)
+    go(tabs, second)
+    assert not tabs.view.compose.is_painting and tabs.view.compose.source is None
+    go(tabs, first)
+    assert tabs.view.compose.is_painting and tabs.view.compose.source == (12.0, 30.0)
+
+
 def test_a_tab_is_put_elsewhere_in_the_bar_and_changes_in_nothing(tabs: Editor) -> None:
     kept = {tab: facts(tab) for tab in tabs.tabs.all}
     way, order = random.Random(5), list(tabs.tabs.all)

@@ -78,6 +78,9 @@ class Refits:
         outdated = (k for k, o in enumerate(document.objects) if o.lifted and o.shaped is not None)
         k = next(outdated, None)
         if k is None:
+            if editor.jobs.is_busy(REFIT):  # it was undone
+                self.forget()
+                editor.jobs.cancel(REFIT)
             return False
         if self._asked is None or not self._asked.is_of(document):
             self._ask(document, k)

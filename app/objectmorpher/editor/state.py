@@ -29,7 +29,7 @@ from .autosave import Autosave
 from .export_plan import What
 from .history import History, Step
 from .settings import Settings
-from .view import CHANGING, MOVING, Action, Hover, StatusMessage, ViewState
+from .view import CHANGING, MOVING, Action, ComposeView, Hover, StatusMessage, ViewState
 
 # A photo or session that is open: its document and steps, its files, and how it was looked at.
 
@@ -38,6 +38,7 @@ OWN_VIEW = (
     "width", "height", "scale", "zoom", "left", "top", "is_fitted", "tool", "split", "shown",
     "orbit",
 )  # fmt: skip
+OWN_COMPOSE = ("is_bare", "is_painting", "source")  # likewise of `ComposeView`
 
 
 @dataclass(eq=False)
@@ -52,6 +53,7 @@ class Tab:
     is_lifting: bool = False  # a lift was stopped when the tab was left
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
+    composed: dict[str, Any] = field(default_factory=dict)  # OWN_COMPOSE, likewise
     exported: frozenset[What] = frozenset()  # what of it was exported
     writing: Step | None = None  # which a session's file is to hold, that is not written yet
     autosave: Autosave = field(init=False)
@@ -83,9 +85,12 @@ class Tab:
     def keep_view(self, view: ViewState) -> None:
         """The tab is left while `view` shows it."""
         self.looked = {name: getattr(view, name) for name in OWN_VIEW}
+        self.composed = {name: getattr(view.compose, name) for name in OWN_COMPOSE}
 
     def restore_view(self, view: ViewState) -> None:
         """The tab is shown again, by a canvas that may have another size now."""
+        for name in OWN_COMPOSE:
+            setattr(view.compose, name, self.composed.get(name, getattr(ComposeView, name)))
         if self.document is None:
             return
         size, scale = (view.width, view.height), view.scale
