@@ -15,6 +15,7 @@ from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.exporting import COPY
 from objectmorpher.editor.view import ToolName
+from objectmorpher.gui.panels.place import placed_values
 from objectmorpher.tools.brush_tools import ComposeTool
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.base.camera import Camera
@@ -100,6 +101,16 @@ def test_it_goes_back_to_where_it_came_in(pasted: Editor) -> None:
     assert pasted.placing.placement == replace(start, turn=(70.0, 0.0, 5.0), scale=0.5)
     run(pasted, "reset_place")
     assert pasted.placing.placement == start
+
+
+def test_its_numbers_are_counted_from_where_it_came_in(pasted: Editor) -> None:
+    home = pasted.placing.home
+    assert home.scale != 1 and home.depth != 0
+    *place, size = placed_values(pasted, home)
+    assert np.abs(place[:3]).max() == 0 and size == 100
+    pasted.placing.move_to(pasted.placing.scaled(home, 1.5 * home.scale))
+    assert pasted.placing.placement is not None
+    assert placed_values(pasted, pasted.placing.placement)[-1] == pytest.approx(150)
 
 
 def test_paste_brings_in_what_was_copied_last(

@@ -71,7 +71,7 @@ def draw_place(editor: Editor) -> None:
         return
     _draw_ground(editor)
     gap(12)
-    values = dict(zip(_names(), _values(editor, placement), strict=True))
+    values = dict(zip(_names(), placed_values(editor, placement), strict=True))
     for group in GROUPS:
         _draw_title(editor, group)
         for number in group.numbers:
@@ -122,12 +122,14 @@ def _draw_depth(editor: Editor, placement: Placement) -> None:
     with small_text():
         beyond = imgui.calc_text_size(far).x + theme.pt(GAP)
     imgui.set_next_item_width(room - beyond)
-    low, high = min(DEPTHS[0], placement.depth), max(DEPTHS[1], placement.depth)
-    is_changed, depth = imgui.slider_float("##depth", placement.depth, low, high, "")
+    home = editor.placing.home.depth
+    value = placement.depth - home
+    low, high = min(DEPTHS[0], value), max(DEPTHS[1], value)
+    is_changed, depth = imgui.slider_float("##depth", value, low, high, "")
     mark(t("Nearer or farther"))
     tooltip(t("How much farther away it is than in the photo, in sizes of the object"))
     if is_changed:
-        editor.placing.move_away(depth)
+        editor.placing.move_away(depth + home)
     if imgui.is_item_deactivated_after_edit():
         editor.commit(t("Move object in depth"))
     imgui.same_line(0, theme.pt(GAP))
@@ -155,14 +157,15 @@ def _draw_seen_from(editor: Editor) -> None:
 
 def _change(editor: Editor, group: Group, values: dict[str, float]) -> None:
     """Numbers of the position count as they are; what is turned or scaled stays on the ground."""
-    placing, was = editor.placing, editor.placing.placement
+    placing, was, home = editor.placing, editor.placing.placement, editor.placing.home
     assert was is not None, "its numbers are shown"
     right, down, away, yaw, pitch, roll, scale = (values[name] for name in _names())
-    placement = replace(was, move=(right, down), depth=away)
+    moved = right + home.move[0], down + home.move[1]
+    placement = replace(was, move=moved, depth=away + home.depth)
     if (yaw, pitch, roll) != placing.angles:
         placement = placing.turned_to(placement, (yaw, pitch, roll))
     elif group.title == "Size":
-        placement = placing.scaled(placement, scale / 100)
+        placement = placing.scaled(placement, scale / 100 * home.scale)
     placing.move_to(placement)
 
 
@@ -170,5 +173,12 @@ def _names() -> list[str]:
     return [number.name for group in GROUPS for number in group.numbers]
 
 
-def _values(editor: Editor, p: Placement) -> tuple[float, ...]:
-    return (*p.move, p.depth, *editor.placing.angles, 100 * p.scale)
+def placed_values(editor: Editor, p: Placement) -> tuple[float, ...]:
+    """The numbers of a placement: right, down, farther, yaw, pitch, roll, size in percent.
+
+    They count from where it was in the photo; of one of another photo, from where it came in.
+    """
+    home = editor.placing.home
+    right, down = p.move[0] - home.move[0], p.move[1] - home.move[1]
+    turn, size = editor.placing.angles, 100 * p.scale / home.scale
+    return right, down, p.depth - home.depth, *turn, size
