@@ -85,6 +85,28 @@ def test_going_from_tab_to_tab_changes_no_document(tabs: Editor) -> None:
     assert first.is_saved
 
 
+def test_what_is_being_changed_in_a_field_goes_with_its_tab_or_tool(tabs: Editor) -> None:
+    first, second, _ = tabs.tabs.all
+    go(tabs, first)
+    move(tabs, 5.0)
+    kept = first.document, second.document
+    finish = replace(tabs.chosen.finish, opacity=0.5)
+    leave: tuple[Callable[[], None], ...] = (
+        partial(go, tabs, second), partial(run, tabs, "pose"), partial(run, tabs, "undo"),
+    )  # fmt: skip
+    for away in leave:
+        go(tabs, first)
+        tabs.choose_tool(ToolName.COMPOSE)
+        tabs.composing.preview_finish(finish)
+        assert tabs.preview is not None
+        away()
+        assert tabs.preview is None and tabs.document is tabs.tab.document
+        tabs.commit("Look of object")  # the button goes up
+    assert second.document is kept[1]
+    tabs.redo()
+    assert first.document is kept[0]
+
+
 def test_a_tab_is_put_elsewhere_in_the_bar_and_changes_in_nothing(tabs: Editor) -> None:
     kept = {tab: facts(tab) for tab in tabs.tabs.all}
     way, order = random.Random(5), list(tabs.tabs.all)

@@ -165,6 +165,7 @@ class Editor(EditorState):
     def _stop(self) -> None:
         """Ends what was begun and asked about the document; files are written to their end."""
         self.hand.abort(self)
+        self.preview = None
         for kind in self.jobs.kinds:
             if kind != COPY and not kind.startswith(WRITE):
                 self.jobs.cancel(kind, RELUCTANCE)
@@ -247,7 +248,7 @@ class Editor(EditorState):
 
     def _travel(self, go: Callable[[], None], text: str) -> None:
         """Goes to another step, which may lack what the view points at."""
-        before = self.committed
+        before, self.preview = self.committed, None
         go()
         assert before is not None
         self.objects.follow(before)
@@ -279,6 +280,7 @@ class Editor(EditorState):
     def choose_tool(self, tool: ToolName) -> None:
         """Changes the tool; the ones that need a lifted object say so."""
         self.hand.abort(self)
+        self.preview = None  # of a field that may vanish before it is let go
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
             self.say(self.why_no_shape)
             return

@@ -56,7 +56,8 @@ class Composing:
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
-        self._compared: tuple[Plate, Document] | None = None  # a variant that is looked at
+        # A variant that is looked at: of what and which, and the document with it
+        self._compared: tuple[tuple[Document, Plate], Document] | None = None
 
     def forget(self) -> None:
         """Another document is opened."""
@@ -173,8 +174,8 @@ class Composing:
             self._compared = None
             return
         plate = self.variants[k].plate
-        if self._compared is None or self._compared[0] is not plate:
-            self._compared = plate, edits.set_plate(document, plate)
+        if self._compared is None or not same(self._compared[0], (document, plate)):
+            self._compared = (document, plate), edits.set_plate(document, plate)
         editor.preview = self._compared[1]
 
     def choose_variant(self, variant: Variant) -> None:
