@@ -181,6 +181,27 @@ def test_the_start_screen_of_a_new_tab_gives_way_to_what_is_opened(
     assert tabs.source == photo_path
 
 
+def test_a_chosen_file_is_for_the_tab_that_asked_for_it(tabs: Editor, tmp_path: Path) -> None:
+    """A dialog of the system stays open while a photo that was being read comes, and is shown."""
+    first, second, _ = tabs.tabs.all
+    path = tmp_path / "a.omorph"
+    for is_closed in (False, True):
+        go(tabs, first)
+        move(tabs, 3.0 + is_closed)
+        first.path = None
+        run(tabs, "save")
+        tabs.filing.wanted = None  # the window shows it
+        go(tabs, second)
+        if is_closed:
+            tabs.tabs.close(first)
+        tabs.filing.choose(Dialog.SAVE, path)
+        wait_for_jobs(tabs)
+        assert second.path is None
+        assert tabs.tab is (second if is_closed else first)
+        assert decode_session(path.read_bytes()).objects[0].placement.move == (3.0, 0.0)
+    assert tabs.message is not None and tabs.message.is_error
+
+
 def test_closing_asks_for_each_tab_and_quitting_once_for_all(tabs: Editor, tmp_path: Path) -> None:
     first, second, third = tabs.tabs.all
     for tab, x in ((first, 3.0), (second, 4.0)):
