@@ -11,6 +11,7 @@ import pytest
 from editor_steps import CENTRE, close_all, open_file, wait_for_jobs
 from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.composing import GRAIN
 from objectmorpher.editor.view import Painted, Selecting, ToolName
 from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher_core import splat_files
@@ -19,7 +20,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftedObject, Placement
 from objectmorpher_core.segment.mask_edit import is_selected
 from objectmorpher_core.session.file import decode_session, encode_session
-from strokes import stroke
+from strokes import press, stroke
 from tests import shapes
 
 
@@ -138,6 +139,29 @@ def test_what_is_painted_nearer_comes_nearer(editor: Editor, ball: Document) -> 
         return float(lifted.world_points(lifted.gaussians.means)[k, 2])
 
     assert depth(near) < depth(lifted_of(editor)) - 0.02
+
+
+@pytest.mark.parametrize("kind", [Painted.DEPTH, Painted.HIDDEN])
+def test_a_moved_object_is_painted_where_it_is_seen(
+    editor: Editor, ball: Document, kind: Painted
+) -> None:
+    editor.start(ball)
+    editor.placing.move_to(Placement(move=(40.0, -6.0), turn=(10.0, 0.0, 0.0)))
+    editor.commit("Move object")
+    editor.view.tool, editor.view.selecting.painted = ToolName.MASK, kind
+    place = np.array([CENTRE[0] - 8, CENTRE[1] + 6])
+    shown = editor.derived.carried(editor.opened, 0, place[None])[0]
+    assert np.hypot(*(shown - place)) > 30
+    press(editor, MaskTool(), editor.view.canvas_from_image(shown))
+    field = editor.shaping._nearness if kind is Painted.DEPTH else editor.shaping._hidden
+    painted = np.argwhere(field(editor.opened.photo.size))[:, ::-1].mean(0)
+    assert np.hypot(*(painted + 0.5 - place)) < 3
+    layer = editor.shaping.painted_layer()
+    assert layer is not None
+    tint = np.argwhere(layer.pixels[..., 3])[:, ::-1].mean(0)
+    corner = editor.view.image_from_canvas((0.0, 0.0))
+    assert np.hypot(*((tint + 0.5) * GRAIN / editor.view.zoom + corner - shown)) < 3
+    editor.hand.abort(editor)
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ class Editor(EditorState):
         self.selection = Selection(
             self, self.tasks, self.masking, self.candidates, self.closer_look
         )
-        self.shaping = Shaping(self, self.posing, self.tasks)
+        self.shaping = Shaping(self, self.landing, self.posing, self.tasks)
         self.computing = Computing(self, self.tasks)
         self.methods = Methods(self, self.computing, self.tasks)
         self.models = Models(self, self.methods, self.shaping, self.tasks)
