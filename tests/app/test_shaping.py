@@ -14,13 +14,14 @@ from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.composing import GRAIN
 from objectmorpher.editor.view import Painted, Selecting, ToolName
 from objectmorpher.tools.brush_tools import MaskTool
+from objectmorpher.tools.place_tool import PlaceTool
 from objectmorpher_core import splat_files
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, LiftedObject, Placement
+from objectmorpher_core.document.model import Document, LiftedObject, Placement, Prompt
 from objectmorpher_core.segment.mask_edit import is_selected
 from objectmorpher_core.session.file import decode_session, encode_session
-from strokes import press, stroke
+from strokes import move, press, stroke
 from tests import shapes
 
 
@@ -139,6 +140,36 @@ def test_what_is_painted_nearer_comes_nearer(editor: Editor, ball: Document) -> 
         return float(lifted.world_points(lifted.gaussians.means)[k, 2])
 
     assert depth(near) < depth(lifted_of(editor)) - 0.02
+
+
+@pytest.fixture
+def beside(editor: Editor, ball: Document) -> Editor:
+    """The ball, and a piece of the wall that is being lifted while the ball is dragged."""
+    mask = np.zeros(ball.objects[0].mask.shape, bool)
+    mask[100:130, 140:170] = True
+    editor.start(edits.set_mask(edits.add_object(ball), 1, mask, Prompt()))
+    editor.objects.choose(1)
+    editor.tasks.lift()
+    editor.objects.choose(0)
+    return editor
+
+
+def test_a_lift_of_another_object_waits_for_the_hand_and_leaves_it_its_tool(
+    beside: Editor,
+) -> None:
+    before = beside.committed
+    beside.choose_tool(ToolName.PLACE)
+    x, y = beside.view.canvas_from_image(np.array(CENTRE))
+    press(beside, PlaceTool(), (x, y))
+    move(beside, (x + 40, y))
+    wait_for_jobs(beside)
+    assert beside.committed is before and beside.opened.objects[0].is_moved
+    beside.escape()
+    assert beside.document is before
+    beside.poll()
+    assert beside.opened.objects[1].lifted is not None
+    assert not beside.opened.objects[0].is_moved
+    assert beside.view.tool is ToolName.PLACE and beside.current == 0
 
 
 @pytest.mark.parametrize("kind", [Painted.DEPTH, Painted.HIDDEN])

@@ -107,7 +107,8 @@ class Editor(EditorState):
         """What is called once a frame; each says whether it has changed anything."""
         tasks = self.tasks
         return (
-            self.jobs.poll, self.chores.poll, tasks.deliver, tasks.rehearse, tasks.ensure_fronts,
+            self.jobs.poll, self.chores.poll, self.answers.deliver, tasks.rehearse,
+            tasks.ensure_fronts,
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
             self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
@@ -174,7 +175,9 @@ class Editor(EditorState):
                 self.chores.cancel(kind)
         self.exporting.close()
         self.objects.carried = None
+        self.answers.forget()
         self.tasks.forget()
+        self.masking.forget()
         self.refits.forget()
         self.edging.forget()
         self.composing.forget()

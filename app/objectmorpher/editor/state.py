@@ -31,6 +31,36 @@ from .history import History, Step
 from .settings import Settings
 from .view import CHANGING, MOVING, Action, Hover, StatusMessage, ViewState
 
+
+class Answers:
+    """What a worker has made: it is taken in, in its order, as soon as the hand is idle."""
+
+    def __init__(self, editor: EditorState) -> None:
+        self._editor = editor
+        self._waiting: list[Callable[[], None]] = []
+
+    def add(self, take: Callable[[], None]) -> None:
+        self._waiting.append(take)
+
+    def take(self, take: Callable[[], None]) -> None:
+        """Takes it in at once, or after the stroke or the field in progress."""
+        self.add(take)
+        self.deliver()
+
+    def forget(self) -> None:
+        self._waiting = []
+
+    def deliver(self) -> bool:
+        """Takes in what waits; whether there was anything."""
+        editor = self._editor
+        if not self._waiting or editor.hand.is_busy or editor.preview is not None:
+            return False
+        waiting, self._waiting = self._waiting, []
+        for take in waiting:
+            take()
+        return True
+
+
 # A photo or session that is open: its document and steps, its files, and how it was looked at.
 
 # Of the view, what belongs to the photo; brushes, panels and the like are the window's.
@@ -104,6 +134,7 @@ class EditorState:
         self.hand = Hand()
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
+        self.answers = Answers(self)
         self.cache = Cache()
         self.tab = Tab()  # the one that is shown; `tabs.py` has them all
         self._preview: Document | None = None

@@ -89,7 +89,6 @@ class Tasks:
         self._posing = posing
         self.question: Question | None = None  # asked, not answered yet
         self.lifts: Question | None = None  # whose answer is lifted at once
-        self._late: Callable[[], None] | None = None  # takes an answer that came during a stroke
         self._plate: tuple[Wanted, Plate] | None = None  # of what was wanted
         self._no_plate: Wanted | None = None  # asked or failed for
         # What stays in front, as it was asked for last: its mask, and the answer
@@ -99,7 +98,7 @@ class Tasks:
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.question = self.lifts = self._late = None
+        self.question = self.lifts = None
         self._plate = self._no_plate = self._front = None
 
     @property
@@ -175,7 +174,7 @@ class Tasks:
         photo = document.photo
 
         def give(found: Found) -> None:
-            self.question = None
+            self.question = None if self.question is question else self.question
             current = editor.document
             if current is not None and current.photo is photo:
                 take(question, found)
@@ -188,22 +187,9 @@ class Tasks:
             t("Selecting"), job_functions.segment, photo.pixels,
             edits.beside(document, question.k, question.prompt),
             BackendChoice(editor.settings.backends.segment, document.seed),
-            done=lambda found: self.take_later(lambda: give(found)), failed=fail,
+            done=lambda found: editor.answers.take(lambda: give(found)), failed=fail,
             cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
-
-    def take_later(self, take: Callable[[], None]) -> None:
-        """Takes the answer about a selection: at once, or after the stroke in progress."""
-        self._late = take
-        self.deliver()
-
-    def deliver(self) -> bool:
-        """Takes the answer that came during a stroke; once a frame. Whether there was one."""
-        if self._late is None or self._editor.hand.is_busy:
-            return False
-        take, self._late = self._late, None
-        take()
-        return True
 
     def _drop_question(self) -> None:
         self.question = None
@@ -273,10 +259,11 @@ class Tasks:
             return change(now, k, matte, lifted, settings)
 
         def show(now: Document) -> None:
-            if label is None:
-                self._take_lift(now, k)
-            elif not editor.hand.is_busy:
+            if editor.current == k:
                 self._posing.select(None)
+            if label is None:
+                self._show_lift(now, k)
+            else:
                 editor.apply(label, editor.derived.solved(now, k, None))
 
         self.make_ready(k, changed, title, show)
@@ -297,14 +284,14 @@ class Tasks:
         What drawing and dragging it take is made in a thread, under `title`. `change` is asked for
         the document now and again then: much may have happened, and None means that it is too late.
         """
-        editor, before = self._editor, self._editor.document
+        editor, before = self._editor, self._editor.committed
         changed = None if before is None else change(before)
         if before is None or changed is None:
             return
         camera, thing = changed.photo.camera, changed.objects[k]
 
         def accept(shape: CanvasShape) -> None:
-            now = editor.document
+            now = editor.committed
             changed = None if now is None else change(now)
             if now is None or changed is None:
                 return
@@ -314,16 +301,18 @@ class Tasks:
 
         editor.chores.start(
             title, lambda progress: build_ready_shape(camera, thing),
-            kind=f"{READY} {k}", done=accept, failed=editor.complain_of,
+            kind=f"{READY} {k}", done=lambda shape: editor.answers.take(lambda: accept(shape)),
+            failed=editor.complain_of,
         )  # fmt: skip
 
-    def _take_lift(self, changed: Document, k: int) -> None:
-        editor = self._editor
-        self._posing.select(None)
+    def _show_lift(self, changed: Document, k: int) -> None:
+        editor, name = self._editor, changed.objects[k].name
         editor.apply(t("Lift object"), changed)
-        editor.view.tool = ToolName.POSE
-        name = changed.objects[k].name
-        editor.say(t("{name} is in 3D now · Drag any point of it", name=name))
+        if editor.current == k:
+            editor.view.tool = ToolName.POSE
+            editor.say(t("{name} is in 3D now · Drag any point of it", name=name))
+        else:  # the artist is at work on another one
+            editor.say(t("{name} is in 3D now", name=name))
 
     def rehearse(self) -> bool:
         """Sees to it that the current object can be dragged at once; each frame."""

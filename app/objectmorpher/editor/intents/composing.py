@@ -22,6 +22,7 @@ from ...system.texts import t
 from ...worker import job_functions
 from ...worker.job_functions import BackendChoice, Variant
 from ...worker.requests import JobError
+from ..state import Answers
 from ..tasks import PLATE
 from ..view import ToolName, ViewState
 
@@ -362,7 +363,9 @@ class Composing:
 
         editor.jobs.start(
             t("Looking how deep the photo is"), job_functions.look_at_depth,
-            document.photo.pixels, done=accept, failed=editor.complain_of, kind=DEPTH,
+            document.photo.pixels,
+            done=lambda depth: self._answers.add(lambda: accept(depth)),
+            failed=editor.complain_of, kind=DEPTH,
         )  # fmt: skip
 
     def choose_refiner(self, name: str) -> None:
@@ -395,29 +398,6 @@ class Composing:
             editor.preview = change(editor.committed, editor.current)
         except ValueError as error:
             editor.complain(str(error))
-
-
-class Answers:
-    """What a worker has made: it is taken in as soon as the hand is idle."""
-
-    def __init__(self, editor: EditorState) -> None:
-        self._editor = editor
-        self._waiting: list[Callable[[], None]] = []
-
-    def add(self, take: Callable[[], None]) -> None:
-        self._waiting.append(take)
-
-    def forget(self) -> None:
-        self._waiting = []
-
-    def deliver(self) -> bool:
-        """Takes in what waits; whether there was anything."""
-        if not self._waiting or self._editor.hand.is_busy:
-            return False
-        waiting, self._waiting = self._waiting, []
-        for take in waiting:
-            take()
-        return True
 
 
 def stroke_tint(

@@ -381,11 +381,10 @@ class Shaping:
             changed = edits.set_lifted(changed, k, matte, lifted)
             return edits.set_placement(changed, k, Placement())
 
-        def show(changed: Document) -> None:
-            if not editor.hand.is_busy:
-                self._show_import(fitting, changed, label)
-
-        self._tasks.make_ready(k, change, t("Placing the object"), show)
+        self._tasks.make_ready(
+            k, change, t("Placing the object"),
+            lambda changed: self._show_import(fitting, changed, label),
+        )  # fmt: skip
 
     def _show_import(self, fitting: Fitting, changed: Document, label: str) -> None:
         editor = self._editor
