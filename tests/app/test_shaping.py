@@ -142,6 +142,29 @@ def test_what_is_painted_nearer_comes_nearer(editor: Editor, ball: Document) -> 
     assert depth(near) < depth(lifted_of(editor)) - 0.02
 
 
+def test_words_in_a_row_are_all_heeded_in_one_step(editor: Editor, ball: Document) -> None:
+    """Also what is said without the worker while it lifts the object anew."""
+    editor.start(ball)
+    editor.shaping.say("Kind of shape", kind="round")
+    editor.shaping.say("Other side", back="mirrored")
+    said = editor.shaping.settings
+    assert (said.kind, said.back) == ("round", "mirrored") and editor.document is ball
+    editor.shaping.preview_thickness(1.5)
+    editor.commit("Thickness")
+    thick = depth_range(editor)
+    wait_for_jobs(editor)
+    assert editor.history is not None and editor.history.count == 3
+    assert editor.history.undo_label == "Kind of shape, Other side"
+    shape = editor.chosen.shape
+    assert (shape.kind, shape.back, shape.thickness) == ("round", "mirrored", 1.5)
+    assert depth_range(editor) == pytest.approx(thick, rel=0.3)
+    editor.shaping.say("Other side", back="continued")
+    editor.undo()  # the answer is then of a shape that is not there any more
+    wait_for_jobs(editor)
+    shape = editor.chosen.shape
+    assert (shape.kind, shape.back, shape.thickness) == ("auto", "continued", 1.5)
+
+
 @pytest.fixture
 def beside(editor: Editor, ball: Document) -> Editor:
     """The ball, and a piece of the wall that is being lifted while the ball is dragged."""
@@ -170,6 +193,14 @@ def test_a_lift_of_another_object_waits_for_the_hand_and_leaves_it_its_tool(
     assert beside.opened.objects[1].lifted is not None
     assert not beside.opened.objects[0].is_moved
     assert beside.view.tool is ToolName.PLACE and beside.current == 0
+
+
+@pytest.mark.slow
+def test_objects_are_lifted_one_after_the_other(beside: Editor) -> None:
+    beside.shaping.say("Other side", back="mirrored")
+    wait_for_jobs(beside)
+    first, second = beside.opened.objects
+    assert first.shape.back == "mirrored" and second.lifted is not None
 
 
 @pytest.mark.parametrize("kind", [Painted.DEPTH, Painted.HIDDEN])

@@ -331,3 +331,15 @@ def test_a_lift_that_was_left_goes_on_when_one_comes_back(tabs: Editor, ball: Do
     go(tabs, tab)
     wait_until(tabs, lambda: tabs.is_lifted)
     assert tab.history is not None and tab.history.count == 2
+
+
+def test_a_word_about_a_shape_that_was_left_is_heeded_when_one_comes_back(tabs: Editor) -> None:
+    first, second, _ = tabs.tabs.all
+    go(tabs, first)
+    tabs.shaping.say("Other side", back="mirrored")
+    go(tabs, second)
+    wait_for_jobs(tabs)
+    assert first.history is not None and first.history.count == 1
+    assert tabs.shaping.settings.back == "auto"
+    go(tabs, first)
+    wait_until(tabs, lambda: tabs.chosen.shape.back == "mirrored")

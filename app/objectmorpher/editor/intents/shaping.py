@@ -79,8 +79,8 @@ class Shaping:
 
     @property
     def settings(self) -> LiftSettings:
-        thing = self._editor.object
-        return thing.shape if thing is not None else AS_SEEN
+        """The words about the current object, also those that its shape does not follow yet."""
+        return self._tasks.wished or AS_SEEN
 
     @property
     def why_fixed(self) -> str | None:
@@ -129,17 +129,17 @@ class Shaping:
 
     def say(self, label: str, **words: object) -> None:
         """A word about the shape: fields of `LiftSettings`."""
-        self._take(label, replace(self.settings, **words))
-
-    def _take(self, label: str, shape: LiftSettings) -> None:
         editor, document = self._editor, self._editor.committed
         thing = editor.object
         if document is None or thing is None or self.why_fixed is not None:
             return
-        if thing.lifted is None:
-            editor.apply(label, edits.set_shape(document, editor.current, shape))
-        else:
-            self._tasks.lift(shape, label)
+        if thing.lifted is not None:
+            self._tasks.lift(label, **words)
+            return
+        shape = replace(self.settings, **words)
+        editor.apply(label, edits.set_shape(document, editor.current, shape))
+        if editor.current in self._tasks.wishes:  # it is being lifted without that word
+            self._tasks.lift()
 
     # Strokes
 
