@@ -241,7 +241,6 @@ class Shaping:
         view, k = self._editor.view, self._editor.current
         if not self._landing.is_current_moved:
             return on_canvas(view, field, scale)
-        from scipy.interpolate import LinearNDInterpolator
         from scipy.spatial import Delaunay
 
         corners = [(v.min() - MARGIN, v.max() + MARGIN) for v in np.nonzero(field)[::-1]]
@@ -250,9 +249,15 @@ class Shaping:
         shown = view.canvas_from_image(self._editor.derived.carried(document, k, photo)) / GRAIN
         height, width = max(view.height // GRAIN, 1), max(view.width // GRAIN, 1)
         rows, columns = height // STRIDE + 1, width // STRIDE + 1
-        v, u = (np.mgrid[:rows, :columns] + 0.5) * STRIDE
+        tint_xy = (np.mgrid[:rows, :columns][::-1].reshape(2, -1).T + 0.5) * STRIDE
         mesh = Delaunay(shown, qhull_options="QJ")  # also of what is seen from its edge
-        at = LinearNDInterpolator(mesh, photo * scale - 0.5)(u, v).astype(np.float32)
+        triangle = mesh.find_simplex(tint_xy)  # -1 beside it
+        to_shares = mesh.transform[triangle]
+        shares = np.einsum("nij,nj->ni", to_shares[:, :2], tint_xy - to_shares[:, 2])
+        shares = np.column_stack([shares, 1 - shares.sum(1)])  # of a triangle's corners
+        at = np.einsum("ni,nij->nj", shares, photo[mesh.simplices[triangle]]) * scale - 0.5
+        at[triangle < 0] = np.nan
+        at = at.astype(np.float32).reshape(rows, columns, 2)
         fine = cv2.resize(at, (columns * STRIDE, rows * STRIDE))[:height, :width]
         fine = np.where(np.isfinite(fine), fine, np.float32(-BESIDE))
         return np.asarray(
