@@ -169,6 +169,15 @@ def test_variants_can_be_looked_at_and_chosen(bare: Editor, ball: Document) -> N
     bare.poll()
     assert bare.document is before
     bare.choose_tool(ToolName.COMPOSE)
+    bare.composing.compare_variant(0)
+    run(bare, "duplicate")  # of the edit, not of what is looked at
+    assert bare.committed is not None and bare.committed.plate is ball.plate
+    bare.composing.compare_variant(0)
+    bare.undo()
+    assert bare.document is ball
+    bare.composing.compare_variant(0)
+    assert bare.opened.objects == ball.objects, "what was undone is not shown"
+    bare.choose_tool(ToolName.COMPOSE)
     bare.composing.choose_variant(variants[1])
     assert bare.document is not None and bare.document.plate is variants[1].plate
     bare.undo()

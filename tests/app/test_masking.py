@@ -21,7 +21,8 @@ from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.render.renderer import same_scene
 from objectmorpher.tools.brush_tools import MaskTool
-from objectmorpher.tools.pointer import Button
+from objectmorpher.tools.navigate import pan
+from objectmorpher.tools.pointer import Button, Pointer
 from objectmorpher.tools.registry import Tool
 from objectmorpher.tools.select_tool import SelectTool
 from objectmorpher_core import segment
@@ -31,7 +32,7 @@ from objectmorpher_core.document.model import Click, Document, EditObject, Place
 from objectmorpher_core.document.settings import Refined
 from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.session.file import decode_session, encode_session
-from strokes import move, press, stroke
+from strokes import move, press, release, stroke
 
 FAR = (20.0, 20.0)  # image px, on the wall
 Places = list[tuple[float, float]]
@@ -397,6 +398,31 @@ def test_presses_of_an_edge_button_add_up(editor: Editor) -> None:
     for _ in range(3):
         run(editor, "undo")
     assert editor.mask is ball
+
+
+def test_what_is_found_while_the_hand_is_busy_waits_for_it(editor: Editor, ball: Document) -> None:
+    """During a pan, or the next stroke, whose turn it is afterwards."""
+    editor.start(ball)
+    assert editor.history is not None
+    editor.view.tool, editor.view.selecting.painted = ToolName.MASK, Painted.EDGE
+    left, right = (editor.view.canvas_from_image(np.array([x, CENTRE[1]])) for x in (56, 124))
+    stroke(editor, MaskTool(), left, left + (0, 30))
+    press(editor, MaskTool(), right)
+    wait_for_jobs(editor)
+    assert editor.committed is ball
+    move(editor, right + (0, 30))
+    release(editor, right + (0, 30))
+    wait_until(editor, lambda: editor.history.count == 3)
+    assert editor.history.steps[1:] == ("Edge brush", "Edge brush")
+    wait_for_jobs(editor)
+    editor.start(ball)
+    run(editor, "grow")
+    editor.hand.press(pan(editor, Pointer(9, 9, is_down=True)), Button.MIDDLE)
+    wait_for_jobs(editor)
+    assert editor.committed is ball
+    release(editor, (9, 9))
+    editor.poll()
+    assert editor.history.undo_label == "Grow selection"
 
 
 def test_what_was_painted_stays_when_a_click_follows(editor: Editor) -> None:

@@ -11,15 +11,17 @@ import pytest
 from editor_steps import CENTRE, close_all, open_file, wait_for_jobs
 from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.composing import GRAIN
 from objectmorpher.editor.view import Painted, Selecting, ToolName
 from objectmorpher.tools.brush_tools import MaskTool
+from objectmorpher.tools.place_tool import PlaceTool
 from objectmorpher_core import splat_files
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, LiftedObject, Placement
+from objectmorpher_core.document.model import Document, LiftedObject, Placement, Prompt
 from objectmorpher_core.segment.mask_edit import is_selected
 from objectmorpher_core.session.file import decode_session, encode_session
-from strokes import stroke
+from strokes import move, press, stroke
 from tests import shapes
 
 
@@ -138,6 +140,90 @@ def test_what_is_painted_nearer_comes_nearer(editor: Editor, ball: Document) -> 
         return float(lifted.world_points(lifted.gaussians.means)[k, 2])
 
     assert depth(near) < depth(lifted_of(editor)) - 0.02
+
+
+def test_words_in_a_row_are_all_heeded_in_one_step(editor: Editor, ball: Document) -> None:
+    """Also what is said without the worker while it lifts the object anew."""
+    editor.start(ball)
+    editor.shaping.say("Kind of shape", kind="round")
+    editor.shaping.say("Other side", back="mirrored")
+    said = editor.shaping.settings
+    assert (said.kind, said.back) == ("round", "mirrored") and editor.document is ball
+    editor.shaping.preview_thickness(1.5)
+    editor.commit("Thickness")
+    thick = depth_range(editor)
+    wait_for_jobs(editor)
+    assert editor.history is not None and editor.history.count == 3
+    assert editor.history.undo_label == "Kind of shape, Other side"
+    shape = editor.chosen.shape
+    assert (shape.kind, shape.back, shape.thickness) == ("round", "mirrored", 1.5)
+    assert depth_range(editor) == pytest.approx(thick, rel=0.3)
+    editor.shaping.say("Other side", back="continued")
+    editor.undo()  # the answer is then of a shape that is not there any more
+    wait_for_jobs(editor)
+    shape = editor.chosen.shape
+    assert (shape.kind, shape.back, shape.thickness) == ("auto", "continued", 1.5)
+
+
+@pytest.fixture
+def beside(editor: Editor, ball: Document) -> Editor:
+    """The ball, and a piece of the wall that is being lifted while the ball is dragged."""
+    mask = np.zeros(ball.objects[0].mask.shape, bool)
+    mask[100:130, 140:170] = True
+    editor.start(edits.set_mask(edits.add_object(ball), 1, mask, Prompt()))
+    editor.objects.choose(1)
+    editor.tasks.lift()
+    editor.objects.choose(0)
+    return editor
+
+
+def test_a_lift_of_another_object_waits_for_the_hand_and_leaves_it_its_tool(
+    beside: Editor,
+) -> None:
+    before = beside.committed
+    beside.choose_tool(ToolName.PLACE)
+    x, y = beside.view.canvas_from_image(np.array(CENTRE))
+    press(beside, PlaceTool(), (x, y))
+    move(beside, (x + 40, y))
+    wait_for_jobs(beside)
+    assert beside.committed is before and beside.opened.objects[0].is_moved
+    beside.escape()
+    assert beside.document is before
+    beside.poll()
+    assert beside.opened.objects[1].lifted is not None
+    assert not beside.opened.objects[0].is_moved
+    assert beside.view.tool is ToolName.PLACE and beside.current == 0
+
+
+@pytest.mark.slow
+def test_objects_are_lifted_one_after_the_other(beside: Editor) -> None:
+    beside.shaping.say("Other side", back="mirrored")
+    wait_for_jobs(beside)
+    first, second = beside.opened.objects
+    assert first.shape.back == "mirrored" and second.lifted is not None
+
+
+@pytest.mark.parametrize("kind", [Painted.DEPTH, Painted.HIDDEN])
+def test_a_moved_object_is_painted_where_it_is_seen(
+    editor: Editor, ball: Document, kind: Painted
+) -> None:
+    editor.start(ball)
+    editor.placing.move_to(Placement(move=(40.0, -6.0), turn=(10.0, 0.0, 0.0)))
+    editor.commit("Move object")
+    editor.view.tool, editor.view.selecting.painted = ToolName.MASK, kind
+    place = np.array([CENTRE[0] - 8, CENTRE[1] + 6])
+    shown = editor.derived.carried(editor.opened, 0, place[None])[0]
+    assert np.hypot(*(shown - place)) > 30
+    press(editor, MaskTool(), editor.view.canvas_from_image(shown))
+    field = editor.shaping._nearness if kind is Painted.DEPTH else editor.shaping._hidden
+    painted = np.argwhere(field(editor.opened.photo.size))[:, ::-1].mean(0)
+    assert np.hypot(*(painted + 0.5 - place)) < 3
+    layer = editor.shaping.painted_layer()
+    assert layer is not None
+    tint = np.argwhere(layer.pixels[..., 3])[:, ::-1].mean(0)
+    corner = editor.view.image_from_canvas((0.0, 0.0))
+    assert np.hypot(*((tint + 0.5) * GRAIN / editor.view.zoom + corner - shown)) < 3
+    editor.hand.abort(editor)
 
 
 @pytest.mark.slow

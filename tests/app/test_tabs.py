@@ -95,6 +95,28 @@ def test_painting_goes_on_in_the_tab_that_it_began_in_only(tabs: Editor) -> None
     assert tabs.view.compose.is_painting and tabs.view.compose.source == (12.0, 30.0)
 
 
+def test_what_is_being_changed_in_a_field_goes_with_its_tab_or_tool(tabs: Editor) -> None:
+    first, second, _ = tabs.tabs.all
+    go(tabs, first)
+    move(tabs, 5.0)
+    kept = first.document, second.document
+    finish = replace(tabs.chosen.finish, opacity=0.5)
+    leave: tuple[Callable[[], None], ...] = (
+        partial(go, tabs, second), partial(run, tabs, "pose"), partial(run, tabs, "undo"),
+    )  # fmt: skip
+    for away in leave:
+        go(tabs, first)
+        tabs.choose_tool(ToolName.COMPOSE)
+        tabs.composing.preview_finish(finish)
+        assert tabs.preview is not None
+        away()
+        assert tabs.preview is None and tabs.document is tabs.tab.document
+        tabs.commit("Look of object")  # the button goes up
+    assert second.document is kept[1]
+    tabs.redo()
+    assert first.document is kept[0]
+
+
 def test_a_tab_is_put_elsewhere_in_the_bar_and_changes_in_nothing(tabs: Editor) -> None:
     kept = {tab: facts(tab) for tab in tabs.tabs.all}
     way, order = random.Random(5), list(tabs.tabs.all)
@@ -167,6 +189,27 @@ def test_the_start_screen_of_a_new_tab_gives_way_to_what_is_opened(
     run(tabs, "close")
     wait_until(tabs, lambda: len(tabs.tabs.all) == 4)
     assert tabs.source == photo_path
+
+
+def test_a_chosen_file_is_for_the_tab_that_asked_for_it(tabs: Editor, tmp_path: Path) -> None:
+    """A dialog of the system stays open while a photo that was being read comes, and is shown."""
+    first, second, _ = tabs.tabs.all
+    path = tmp_path / "a.omorph"
+    for is_closed in (False, True):
+        go(tabs, first)
+        move(tabs, 3.0 + is_closed)
+        first.path = None
+        run(tabs, "save")
+        tabs.filing.wanted = None  # the window shows it
+        go(tabs, second)
+        if is_closed:
+            tabs.tabs.close(first)
+        tabs.filing.choose(Dialog.SAVE, path)
+        wait_for_jobs(tabs)
+        assert second.path is None
+        assert tabs.tab is (second if is_closed else first)
+        assert decode_session(path.read_bytes()).objects[0].placement.move == (3.0, 0.0)
+    assert tabs.message is not None and tabs.message.is_error
 
 
 def test_closing_asks_for_each_tab_and_quitting_once_for_all(tabs: Editor, tmp_path: Path) -> None:
@@ -298,3 +341,15 @@ def test_a_lift_that_was_left_goes_on_when_one_comes_back(tabs: Editor, ball: Do
     go(tabs, tab)
     wait_until(tabs, lambda: tabs.is_lifted)
     assert tab.history is not None and tab.history.count == 2
+
+
+def test_a_word_about_a_shape_that_was_left_is_heeded_when_one_comes_back(tabs: Editor) -> None:
+    first, second, _ = tabs.tabs.all
+    go(tabs, first)
+    tabs.shaping.say("Other side", back="mirrored")
+    go(tabs, second)
+    wait_for_jobs(tabs)
+    assert first.history is not None and first.history.count == 1
+    assert tabs.shaping.settings.back == "auto"
+    go(tabs, first)
+    wait_until(tabs, lambda: tabs.chosen.shape.back == "mirrored")

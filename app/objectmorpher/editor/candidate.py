@@ -187,7 +187,7 @@ class Candidates:
                 if wanted is not None:
                     editor.complain(answer)
             elif wanted is not None:
-                self._tasks.take_later(lambda: self.answered(wanted, answer, prompt))
+                editor.answers.take(lambda: self.answered(wanted, answer, prompt))
             elif self._is_wished() and editor.mask is before:
                 self.shown = Candidate(photo, prompt, answer, before)
                 self._look_closer(self.shown)

@@ -72,7 +72,7 @@ class Editor(EditorState):
         self.selection = Selection(
             self, self.tasks, self.masking, self.candidates, self.closer_look
         )
-        self.shaping = Shaping(self, self.posing, self.tasks)
+        self.shaping = Shaping(self, self.landing, self.posing, self.tasks)
         self.computing = Computing(self, self.tasks)
         self.methods = Methods(self, self.computing, self.tasks)
         self.models = Models(self, self.methods, self.shaping, self.tasks)
@@ -107,7 +107,8 @@ class Editor(EditorState):
         """What is called once a frame; each says whether it has changed anything."""
         tasks = self.tasks
         return (
-            self.jobs.poll, self.chores.poll, tasks.deliver, tasks.rehearse, tasks.ensure_fronts,
+            self.jobs.poll, self.chores.poll, self.answers.deliver, tasks.rehearse,
+            tasks.ensure_fronts,
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.painting.deliver,
             self.refining.deliver,
             self.tabs.keep_safe, self.candidates.poll, self.closer_look.poll, self.sample.poll,
@@ -165,6 +166,7 @@ class Editor(EditorState):
     def _stop(self) -> None:
         """Ends what was begun and asked about the document; files are written to their end."""
         self.hand.abort(self)
+        self.preview = None
         for kind in self.jobs.kinds:
             if kind != COPY and not kind.startswith(WRITE):
                 self.jobs.cancel(kind, RELUCTANCE)
@@ -173,7 +175,9 @@ class Editor(EditorState):
                 self.chores.cancel(kind)
         self.exporting.close()
         self.objects.carried = None
+        self.answers.forget()
         self.tasks.forget()
+        self.masking.forget()
         self.refits.forget()
         self.edging.forget()
         self.composing.forget()
@@ -247,7 +251,7 @@ class Editor(EditorState):
 
     def _travel(self, go: Callable[[], None], text: str) -> None:
         """Goes to another step, which may lack what the view points at."""
-        before = self.committed
+        before, self.preview = self.committed, None
         go()
         assert before is not None
         self.objects.follow(before)
@@ -279,6 +283,7 @@ class Editor(EditorState):
     def choose_tool(self, tool: ToolName) -> None:
         """Changes the tool; the ones that need a lifted object say so."""
         self.hand.abort(self)
+        self.preview = None  # of a field that may vanish before it is let go
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
             self.say(self.why_no_shape)
             return

@@ -22,6 +22,7 @@ from .tasks import SELECT, WRITE
 from .view import ToolName
 
 if TYPE_CHECKING:
+    from .history import History
     from .intents.exporting import Exporting
     from .intents.selection import Selection
     from .state import EditorState, Tab
@@ -56,6 +57,12 @@ class Dialog(Enum):
         """Whether it asks for a file that is there."""
         return self not in (Dialog.SAVE, Dialog.EXPORT, Dialog.MASK_SAVE)
 
+    @property
+    def is_about_a_photo(self) -> bool:
+        """Whether the file is for what a tab shows, and not for the window."""
+        files = (Dialog.SHAPE_OPEN, Dialog.VIEW_OPEN, Dialog.MASK_OPEN)
+        return self in files or not self.is_opening
+
 
 Uses = Mapping[Dialog, Callable[[Path], None]]
 Opened = tuple[OpenedFile, Path | None]
@@ -72,12 +79,24 @@ class Filing:
         self._tasks, self._exporting, self._uses, self._tabs = tasks, exporting, uses, tabs
         self.fov: float | None = None  # degrees, of photos that are opened
         self.seed = 0  # likewise
-        self.wanted: Dialog | None = None  # the window shows it
+        self._wanted: Dialog | None = None
+        self._wanted_for: tuple[Dialog, History | None] | None = None  # until it is answered
         self.question: Callable[[], None] | None = None  # goes on when the changes may be lost
         self.asked: tuple[Tab, ...] = ()  # the tabs with the changes that the question is about
         self.leaving: Callable[[], None] | None = None  # goes on when all files are written
         self._after_save: Callable[[], None] | None = None
         self._saves_all = False  # as the answer was
+
+    @property
+    def wanted(self) -> Dialog | None:
+        """The dialog that the window is to show; its answer is for the tab that asks for it."""
+        return self._wanted
+
+    @wanted.setter
+    def wanted(self, dialog: Dialog | None) -> None:
+        self._wanted = dialog
+        if dialog is not None:
+            self._wanted_for = dialog, self._editor.history
 
     @property
     def is_asking(self) -> bool:
@@ -256,7 +275,21 @@ class Filing:
         self.question = None
 
     def choose(self, dialog: Dialog, path: Path) -> None:
-        """The user chose a file in a dialog."""
+        """The user chose a file in a dialog; the tab that asked for it is shown again first."""
+        asked, self._wanted_for = self._wanted_for, None
+        if asked is None or asked[0] is not dialog or not dialog.is_about_a_photo:
+            self._use(dialog, path)
+            return
+        tab = next((tab for tab in self._tabs.all if tab.history is asked[1]), None)
+        if tab is not None:
+            self._tabs.go(tab, lambda: self._use(dialog, path))
+            return
+        self.cancel_dialog()
+        self._editor.complain(
+            t("The photo that {name} was chosen for is not open any more", name=path.name)
+        )
+
+    def _use(self, dialog: Dialog, path: Path) -> None:
         if dialog is Dialog.OPEN:
             self.open(path)
         elif dialog is Dialog.SAVE:
@@ -272,7 +305,8 @@ class Filing:
 
     def cancel_dialog(self) -> None:
         """The user closed a dialog without choosing."""
-        self.wanted, self._after_save, self._saves_all = None, None, False
+        self.wanted = self._wanted_for = self._after_save = None
+        self._saves_all = False
 
     def save(self) -> None:
         """Save into the session's own file; ask for one where there is none yet."""

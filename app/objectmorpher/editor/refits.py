@@ -136,9 +136,6 @@ class Refits:
             return edge_edits.keep_refined(fitted, document.refined, disturbed)
 
         def show(changed: Document) -> None:
-            if editor.hand.is_busy or editor.preview is not None:
-                keep()  # once more, when the hand is idle
-                return
             assert editor.history is not None and editor.committed is not None
             self._asked = None  # a later step may ask for the same
             changed = _held(editor, changed, k)

@@ -6,10 +6,10 @@ use; the editor (`editor.py`) puts them together. No GL, no ImGui, no window in 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,57 @@ from .history import History, Step
 from .settings import Settings
 from .view import CHANGING, MOVING, Action, ComposeView, Hover, StatusMessage, ViewState
 
+if TYPE_CHECKING:
+    from objectmorpher_core.lift.registration.other_photo import OtherPhoto
+
+
+class Answers:
+    """What a worker has made: it is taken in, in its order, as soon as the hand is idle."""
+
+    def __init__(self, editor: EditorState) -> None:
+        self._editor = editor
+        self._waiting: list[Callable[[], None]] = []
+
+    def add(self, take: Callable[[], None]) -> None:
+        self._waiting.append(take)
+
+    def take(self, take: Callable[[], None]) -> None:
+        """Takes it in at once, or after the stroke or the field in progress."""
+        self.add(take)
+        self.deliver()
+
+    def forget(self) -> None:
+        self._waiting = []
+
+    def deliver(self) -> bool:
+        """Takes in what waits; whether there was anything."""
+        editor = self._editor
+        if not self._waiting or editor.hand.is_busy or editor.preview is not None:
+            return False
+        waiting, self._waiting = self._waiting, []
+        for take in waiting:
+            take()
+        return True
+
+
+@dataclass(frozen=True, eq=False)
+class Wish:
+    """A lift that was asked for and is not there yet."""
+
+    mask: Mask  # known by its identity: with another one the answer is too late
+    label: str | None = None  # of the step; None: the first lift of the object
+    words: Mapping[str, object] = field(default_factory=dict)  # fields of `LiftSettings`
+    other: Path | OtherPhoto | None = None  # a further photo of the object
+
+    def after(self, older: Wish | None) -> Wish:
+        """Return both wishes as one, for one step."""
+        if older is None or older.mask is not self.mask:
+            return self
+        labels = dict.fromkeys(label for label in (older.label, self.label) if label)
+        words, other = {**older.words, **self.words}, self.other or older.other
+        return Wish(self.mask, ", ".join(labels) or None, words, other)
+
+
 # A photo or session that is open: its document and steps, its files, and how it was looked at.
 
 # Of the view, what belongs to the photo; brushes, panels and the like are the window's.
@@ -50,7 +101,7 @@ class Tab:
     source: Path | None = None  # the photo's file
     current: int = 0  # index of the object that the tools change
     selected: tuple[int, ...] = ()  # handles, as the tab was left
-    is_lifting: bool = False  # a lift was stopped when the tab was left
+    wishes: dict[int, Wish] = field(default_factory=dict)  # lifts that were stopped then
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
     composed: dict[str, Any] = field(default_factory=dict)  # OWN_COMPOSE, likewise
@@ -109,6 +160,7 @@ class EditorState:
         self.hand = Hand()
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
+        self.answers = Answers(self)
         self.cache = Cache()
         self.tab = Tab()  # the one that is shown; `tabs.py` has them all
         self._preview: Document | None = None

@@ -123,7 +123,7 @@ class Tabs:
     def _show(self, tab: Tab) -> None:
         editor, left = self._editor, self._editor.tab
         editor.hand.abort(editor)
-        left.selected, left.is_lifting = self._posing.selected, self._editor.is_lifting
+        left.selected, left.wishes = self._posing.selected, dict(self._tasks.wishes)
         left.keep_view(editor.view)
         shapes, document = tab.shapes, left.document
         for other in self.all:
@@ -140,8 +140,7 @@ class Tabs:
         self._posing.select(*tab.selected)
         if not editor.is_lifted:
             self._tasks.read_photo()
-        if tab.is_lifting and not editor.is_lifted:
-            self._tasks.lift()
+        self._tasks.resume(tab.wishes)
 
     def _share_memory(self) -> None:
         shared = (self._editor.settings.history_mb << 20) // len(self.all)

@@ -6,8 +6,8 @@ the mask of a document never change, they are replaced.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,6 +34,7 @@ from ..system.texts import folder_of, t
 from ..worker import job_functions
 from ..worker.job_functions import BackendChoice, Cut
 from ..worker.requests import LIFT, READY, JobError
+from .state import Wish
 from .view import Action, SelectMode, ToolName
 
 if TYPE_CHECKING:
@@ -72,13 +73,20 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """An object that is to be lifted."""
+    """An object that is being lifted."""
 
     k: int
-    mask: Mask  # known by its identity: with another one the answer is too late
-    cut: Cut
-    lifter: BackendChoice
-    shape: LiftSettings
+    wish: Wish
+    shape: LiftSettings  # as it was then
+
+    def is_of(self, shape: LiftSettings) -> bool:
+        """Whether nothing but the thickness was said since then."""
+        names = [each.name for each in fields(shape) if each.name != "thickness"]
+        return all(same(getattr(shape, name), getattr(self.shape, name)) for name in names)
+
+
+def _with_words(shape: LiftSettings, wish: Wish) -> LiftSettings:
+    return replace(shape, **dict(wish.words))
 
 
 class Tasks:
@@ -89,7 +97,7 @@ class Tasks:
         self._posing = posing
         self.question: Question | None = None  # asked, not answered yet
         self.lifts: Question | None = None  # whose answer is lifted at once
-        self._late: Callable[[], None] | None = None  # takes an answer that came during a stroke
+        self.wishes: dict[int, Wish] = {}  # by object: what is not lifted yet; the first is asked
         self._plate: tuple[Wanted, Plate] | None = None  # of what was wanted
         self._no_plate: Wanted | None = None  # asked or failed for
         # What stays in front, as it was asked for last: its mask, and the answer
@@ -99,7 +107,8 @@ class Tasks:
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.question = self.lifts = self._late = None
+        self.question = self.lifts = None
+        self.wishes = {}  # the older one is that of what was asked
         self._plate = self._no_plate = self._front = None
 
     @property
@@ -175,7 +184,7 @@ class Tasks:
         photo = document.photo
 
         def give(found: Found) -> None:
-            self.question = None
+            self.question = None if self.question is question else self.question
             current = editor.document
             if current is not None and current.photo is photo:
                 take(question, found)
@@ -188,22 +197,9 @@ class Tasks:
             t("Selecting"), job_functions.segment, photo.pixels,
             edits.beside(document, question.k, question.prompt),
             BackendChoice(editor.settings.backends.segment, document.seed),
-            done=lambda found: self.take_later(lambda: give(found)), failed=fail,
+            done=lambda found: editor.answers.take(lambda: give(found)), failed=fail,
             cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
-
-    def take_later(self, take: Callable[[], None]) -> None:
-        """Takes the answer about a selection: at once, or after the stroke in progress."""
-        self._late = take
-        self.deliver()
-
-    def deliver(self) -> bool:
-        """Takes the answer that came during a stroke; once a frame. Whether there was one."""
-        if self._late is None or self._editor.hand.is_busy:
-            return False
-        take, self._late = self._late, None
-        take()
-        return True
 
     def _drop_question(self) -> None:
         self.question = None
@@ -213,76 +209,134 @@ class Tasks:
         self.lifts = self.question
         self._editor.say(t("It is lifted as soon as it is selected"))
 
-    def lift(self, shape: LiftSettings | None = None, label: str | None = None) -> None:
-        """Asks for the current object in 3D; with another `shape`, which is a step of its own."""
-        if (asked := self._asked(shape)) is None:
-            return
-        title = t("Lifting the object")
+    @property
+    def wished(self) -> LiftSettings | None:
+        """The words about the current object's shape, with those that it does not follow yet."""
+        thing, wish = self._editor.object, self.wishes.get(self._editor.current)
+        if thing is None or wish is None or wish.mask is not thing.mask:
+            return None if thing is None else thing.shape
+        return _with_words(thing.shape, wish)
 
-        def accept(answer: tuple[Matte, LiftedObject]) -> None:
-            self._take_shape(asked, (asked.shape, *answer), title, label)
-
-        self._editor.jobs.start(
-            title, job_functions.lift, asked.cut, asked.lifter, asked.shape,
-            done=accept, failed=self._editor.complain_of, kind=LIFT,
-        )  # fmt: skip
+    def lift(self, label: str | None = None, **words: object) -> None:
+        """Asks for the current object in 3D; with other `words` about its shape it is a step."""
+        self._wish(label, words)
 
     def lift_with(self, other: Path | OtherPhoto, label: str) -> None:
         """Asks for the current object lifted with another photo of it, too; one step."""
-        if (asked := self._asked()) is None:
+        older = self.wishes.get(self._editor.current)
+        if older is not None and older.other is not None:
+            self._editor.say(self._editor.why_no_shape)  # one after the other
+        else:
+            self._wish(label, {}, other)
+
+    def resume(self, wishes: Mapping[int, Wish]) -> None:
+        """Asks for what was not lifted yet when the document was left."""
+        self.wishes = dict(wishes)
+        self._ask_lift()
+
+    def _wish(
+        self, label: str | None, words: Mapping[str, object],
+        other: Path | OtherPhoto | None = None,
+    ) -> None:  # fmt: skip
+        """Further words about an object that is being lifted begin that anew, for one step."""
+        editor, thing = self._editor, self._editor.object
+        if editor.document is None or thing is None or thing.selection is None:
             return
-        title = t("Comparing with {name}", name=other.name)
+        assert thing.mask is not None
+        editor.message = None
+        k, wish = editor.current, Wish(thing.mask, label, words, other)
+        self.wishes[k] = wish.after(self.wishes.get(k))
+        if next(iter(self.wishes)) == k:
+            self._ask_lift()
 
-        def accept(answer: tuple[LiftSettings, Matte, LiftedObject]) -> None:
-            self._take_shape(asked, answer, title, label)
+    def _ask_lift(self) -> None:
+        """For the first object that is to be lifted."""
+        editor, document, wishes = self._editor, self._editor.committed, self.wishes
+        if document is None or not wishes:
+            return
+        k, wish = next(iter(wishes.items()))
+        thing = document.objects[k] if k < len(document.objects) else None
+        if thing is None or thing.mask is not wish.mask or thing.selection is None:
+            self._end_lift(k, wish)
+            return
+        wanted = replace(
+            _with_words(thing.shape, wish),
+            count=editor.settings.gaussians, horizon=document.horizon,
+        )  # fmt: skip
+        asked = _Asked(k, wish, thing.shape)
+        cut = Cut(document.photo.pixels, document.photo.camera, thing.selection, thing.mixed)
+        choice = BackendChoice(editor.settings.backends.lift, document.seed)
 
-        self._editor.jobs.start(
-            title, job_functions.lift_with_photo, asked.cut, other,
-            (self._editor.settings.backends.segment, asked.lifter), asked.shape,
-            done=accept, failed=self._editor.complain_of, kind=LIFT,
+        def fail(error: JobError) -> None:
+            self._end_lift(k, wish)
+            editor.complain_of(error.retried_by(lambda: self.resume({**self.wishes, k: wish})))
+
+        if wish.other is None:
+            title = t("Lifting the object")
+            editor.jobs.start(
+                title, job_functions.lift, cut, choice, wanted,
+                done=lambda answer: self._take_shape(asked, (wanted, *answer), title),
+                failed=fail, cancelled=wishes.clear, kind=LIFT,
+            )  # fmt: skip
+            return
+        title = t("Comparing with {name}", name=wish.other.name)
+        editor.jobs.start(
+            title, job_functions.lift_with_photo, cut, wish.other,
+            (editor.settings.backends.segment, choice), wanted,
+            done=lambda answer: self._take_shape(asked, answer, title),
+            failed=fail, cancelled=wishes.clear, kind=LIFT,
         )  # fmt: skip
 
-    def _asked(self, shape: LiftSettings | None = None) -> _Asked | None:
-        """The current object, to be lifted; None where nothing is selected."""
-        editor, document = self._editor, self._editor.document
-        thing = editor.object
-        if document is None or thing is None or thing.selection is None or thing.mask is None:
-            return None
-        editor.message = None
-        photo, settings = document.photo, editor.settings
-        wanted = replace(shape or thing.shape, count=settings.gaussians, horizon=document.horizon)
-        cut = Cut(photo.pixels, photo.camera, thing.selection, thing.mixed)
-        choice = BackendChoice(settings.backends.lift, document.seed)
-        return _Asked(editor.current, thing.mask, cut, choice, wanted)
+    def _end_lift(self, k: int, wish: Wish) -> None:
+        """It is there, or will not be; on to the next one."""
+        if self.wishes.get(k) is wish:
+            del self.wishes[k]
+            self._ask_lift()
 
     def _take_shape(
-        self,
-        asked: _Asked,
-        made: tuple[LiftSettings, Matte, LiftedObject],
-        title: str,
-        label: str | None,
+        self, asked: _Asked, made: tuple[LiftSettings, Matte, LiftedObject], title: str
     ) -> None:
-        """What was asked for; with a `label` it is another shape of what was lifted, as a step."""
-        editor, k = self._editor, asked.k
+        """What was asked for; with a label it is another shape of what was lifted, as a step."""
+        editor, k, wish = self._editor, asked.k, asked.wish
         settings, matte, lifted = made
 
         def changed(now: Document) -> Document | None:
-            if k >= len(now.objects) or now.objects[k].mask is not asked.mask:
+            thing = now.objects[k] if k < len(now.objects) else None
+            if thing is None or thing.mask is not wish.mask or self.wishes.get(k) is not wish:
                 return None
-            change = edits.set_lifted if label is None else edits.reshape
-            return change(now, k, matte, lifted, settings)
+            if wish.label is None:
+                return edits.set_lifted(now, k, matte, lifted, settings)
+            if thing.lifted is None or not asked.is_of(thing.shape):
+                return None
+            reshaped = edits.reshape(now, k, matte, lifted, settings)
+            if thing.shape.thickness in (asked.shape.thickness, settings.thickness):
+                return reshaped
+            return edits.set_thickness(reshaped, k, thing.shape.thickness)
 
         def show(now: Document) -> None:
-            if label is None:
-                self._take_lift(now, k)
-            elif not editor.hand.is_busy:
+            if editor.current == k:
                 self._posing.select(None)
-                editor.apply(label, editor.derived.solved(now, k, None))
+            if wish.label is None:
+                self._show_lift(now, k)
+            else:
+                editor.apply(wish.label, editor.derived.solved(now, k, None))
+            self._end_lift(k, wish)
 
-        self.make_ready(k, changed, title, show)
-        now = self._editor.document
-        ahead = None if label is not None or now is None else changed(now)
-        if ahead is not None and not self._editor.jobs.is_busy(PLATE):
+        def drop() -> None:
+            """It cannot be had; of a shape that was undone meanwhile it is asked for anew."""
+            now = editor.committed
+            thing = now.objects[k] if now is not None and k < len(now.objects) else None
+            is_lifted = thing is not None and thing.lifted is not None
+            is_other = thing is not None and is_lifted and not asked.is_of(thing.shape)
+            if is_other and wish.label is not None and self.wishes.get(k) is wish:
+                self._ask_lift()
+            else:
+                self._end_lift(k, wish)
+
+        self.make_ready(k, changed, title, show, drop)
+        now = editor.committed
+        ahead = None if wish.label is not None or now is None else changed(now)
+        if ahead is not None and not editor.jobs.is_busy(PLATE):
             self._ensure_plate_of(ahead)  # the fill need not wait for what is made ready
 
     def make_ready(
@@ -291,39 +345,49 @@ class Tasks:
         change: Callable[[Document], Document | None],
         title: str,
         show: Callable[[Document], None],
+        drop: Callable[[], None] = lambda: None,
     ) -> None:
         """Shows a document in which object `k` is another one, when that can be drawn at once.
 
         What drawing and dragging it take is made in a thread, under `title`. `change` is asked for
-        the document now and again then: much may have happened, and None means that it is too late.
+        the document now and again then: much may have happened, and None means that it is too late:
+        then `drop` is called.
         """
-        editor, before = self._editor, self._editor.document
+        editor, before = self._editor, self._editor.committed
         changed = None if before is None else change(before)
         if before is None or changed is None:
+            drop()
             return
         camera, thing = changed.photo.camera, changed.objects[k]
 
         def accept(shape: CanvasShape) -> None:
-            now = editor.document
+            now = editor.committed
             changed = None if now is None else change(now)
             if now is None or changed is None:
+                drop()
                 return
             if now.objects[k] is before.objects[k]:
                 editor.derived.remember(changed.objects[k], shape)
             show(changed)
 
+        def fail(error: JobError) -> None:
+            drop()
+            editor.complain_of(error)
+
         editor.chores.start(
             title, lambda progress: build_ready_shape(camera, thing),
-            kind=f"{READY} {k}", done=accept, failed=editor.complain_of,
+            kind=f"{READY} {k}", done=lambda shape: editor.answers.take(lambda: accept(shape)),
+            failed=fail, replaced=drop,
         )  # fmt: skip
 
-    def _take_lift(self, changed: Document, k: int) -> None:
-        editor = self._editor
-        self._posing.select(None)
+    def _show_lift(self, changed: Document, k: int) -> None:
+        editor, name = self._editor, changed.objects[k].name
         editor.apply(t("Lift object"), changed)
-        editor.view.tool = ToolName.POSE
-        name = changed.objects[k].name
-        editor.say(t("{name} is in 3D now · Drag any point of it", name=name))
+        if editor.current == k:
+            editor.view.tool = ToolName.POSE
+            editor.say(t("{name} is in 3D now · Drag any point of it", name=name))
+        else:  # the artist is at work on another one
+            editor.say(t("{name} is in 3D now", name=name))
 
     def rehearse(self) -> bool:
         """Sees to it that the current object can be dragged at once; each frame."""

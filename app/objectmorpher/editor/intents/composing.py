@@ -22,6 +22,7 @@ from ...system.texts import t
 from ...worker import job_functions
 from ...worker.job_functions import BackendChoice, Variant
 from ...worker.requests import JobError
+from ..state import Answers
 from ..tasks import PLATE
 from ..view import ToolName, ViewState
 
@@ -56,7 +57,8 @@ class Composing:
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
-        self._compared: tuple[Plate, Document] | None = None  # a variant that is looked at
+        # A variant that is looked at: of what and which, and the document with it
+        self._compared: tuple[tuple[Document, Plate], Document] | None = None
 
     def forget(self) -> None:
         """Another document is opened."""
@@ -173,8 +175,8 @@ class Composing:
             self._compared = None
             return
         plate = self.variants[k].plate
-        if self._compared is None or self._compared[0] is not plate:
-            self._compared = plate, edits.set_plate(document, plate)
+        if self._compared is None or not same(self._compared[0], (document, plate)):
+            self._compared = (document, plate), edits.set_plate(document, plate)
         editor.preview = self._compared[1]
 
     def choose_variant(self, variant: Variant) -> None:
@@ -361,7 +363,9 @@ class Composing:
 
         editor.jobs.start(
             t("Looking how deep the photo is"), job_functions.look_at_depth,
-            document.photo.pixels, done=accept, failed=editor.complain_of, kind=DEPTH,
+            document.photo.pixels,
+            done=lambda depth: self._answers.add(lambda: accept(depth)),
+            failed=editor.complain_of, kind=DEPTH,
         )  # fmt: skip
 
     def choose_refiner(self, name: str) -> None:
@@ -394,29 +398,6 @@ class Composing:
             editor.preview = change(editor.committed, editor.current)
         except ValueError as error:
             editor.complain(str(error))
-
-
-class Answers:
-    """What a worker has made: it is taken in as soon as the hand is idle."""
-
-    def __init__(self, editor: EditorState) -> None:
-        self._editor = editor
-        self._waiting: list[Callable[[], None]] = []
-
-    def add(self, take: Callable[[], None]) -> None:
-        self._waiting.append(take)
-
-    def forget(self) -> None:
-        self._waiting = []
-
-    def deliver(self) -> bool:
-        """Takes in what waits; whether there was anything."""
-        if not self._waiting or self._editor.hand.is_busy:
-            return False
-        waiting, self._waiting = self._waiting, []
-        for take in waiting:
-            take()
-        return True
 
 
 def stroke_tint(

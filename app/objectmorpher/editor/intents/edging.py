@@ -108,7 +108,7 @@ class Edging:
 
         def accept(answer: tuple[U8, Mask]) -> None:
             now = self._thing_of(wish)
-            if now is None or now.selection is not thing.selection or editor.hand.is_busy:
+            if now is None or now.selection is not thing.selection:
                 self._waiting.clear()
                 return
             self._take(wish, *answer)
@@ -122,8 +122,8 @@ class Edging:
         editor.jobs.start(
             t("Looking for the edge"), job_functions.brush_edge,
             EdgeStroke(wish.photo.pixels, thing.selection, thing.mixed, wish.painted),
-            wish.is_erasing, done=accept, failed=fail, cancelled=self._waiting.clear,
-            kind=BRUSH_EDGE,
+            wish.is_erasing, done=lambda answer: editor.answers.take(lambda: accept(answer)),
+            failed=fail, cancelled=self._waiting.clear, kind=BRUSH_EDGE,
         )  # fmt: skip
 
     def _thing_of(self, wish: EdgeWish) -> EditObject | None:

@@ -176,14 +176,14 @@ class Masking:
         if not self._waiting:
             return
         if thing is None or thing.selection is None:
-            self._forget()
+            self.forget()
             return
         change, k = self._waiting[0], editor.current
 
         def accept(changed: Selection) -> None:
             now = editor.object.selection if editor.object else None
-            if now is not thing.selection or editor.current != k or editor.hand.is_busy:
-                self._forget()
+            if now is not thing.selection or editor.current != k:
+                self.forget()
                 return
             self._apply(change.label, changed)
             self._waiting.pop(0)
@@ -192,15 +192,16 @@ class Masking:
         editor.jobs.start(
             t("Changing the selection"), job_functions.change_mask,
             thing.selection, change.function,
-            done=accept, failed=lambda error: self._fail(error, change),
-            cancelled=self._forget, kind=CHANGE,
+            done=lambda changed: editor.answers.take(lambda: accept(changed)),
+            failed=lambda error: self._fail(error, change), cancelled=self.forget, kind=CHANGE,
         )  # fmt: skip
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
+        """Drop the changes that wait, such as those of another document."""
         self._waiting.clear()
 
     def _fail(self, error: JobError, change: MaskChange) -> None:
-        self._forget()
+        self.forget()
         self._editor.complain_of(error.retried_by(lambda: self._enqueue(change)))
 
     # Files
@@ -219,7 +220,8 @@ class Masking:
 
         editor.jobs.start(
             t("Reading {name}", name=path.name), job_functions.read_coverage, path, photo.size,
-            done=accept, failed=editor.complain_of, kind=READ_MASK,
+            done=lambda coverage: editor.answers.take(lambda: accept(coverage)),
+            failed=editor.complain_of, kind=READ_MASK,
         )  # fmt: skip
 
     def write_file(self, path: Path) -> None:

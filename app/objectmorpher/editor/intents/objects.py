@@ -90,10 +90,10 @@ class Objects:
     def toggle_visible(self, k: int) -> None:
         """Shows or hides object `k`."""
         editor = self._editor
-        if editor.document is not None:
-            is_visible = not editor.document.objects[k].is_visible
+        if (document := editor.committed) is not None:
+            is_visible = not document.objects[k].is_visible
             label = t("Show object") if is_visible else t("Hide object")
-            editor.apply(label, edits.set_visible(editor.document, k, is_visible))
+            editor.apply(label, edits.set_visible(document, k, is_visible))
             if editor.message is self._hidden:
                 editor.message = None
 
@@ -116,7 +116,7 @@ class Objects:
         """Gives object `k` another name; an empty one changes nothing."""
         editor = self._editor
         self.renaming = None
-        document = editor.document
+        document = editor.committed
         if document is None or not name.strip() or name.strip() == document.objects[k].name:
             return
         editor.apply(t("Rename object"), edits.rename(document, k, name))
@@ -124,9 +124,10 @@ class Objects:
     def duplicate(self) -> None:
         """A copy of the current object, which the tools change from now on."""
         editor = self._editor
-        if editor.document is None or not editor.is_lifted or editor.hand.is_busy:
+        document = editor.committed
+        if document is None or not editor.is_lifted or editor.hand.is_busy:
             return
-        copied = edits.duplicate(editor.document, editor.current)
+        copied = edits.duplicate(document, editor.current)
         editor.apply(t("Duplicate object"), copied)
         self.choose(len(copied.objects) - 1)
         if editor.view.tool is ToolName.SELECT:  # a click would change the outline of both
@@ -143,7 +144,8 @@ class Objects:
     def remove(self) -> None:
         """The current object is not edited any more: the photo shows it as it was."""
         editor = self._editor
-        if editor.document is None or editor.object is None or editor.hand.is_busy:
+        document = editor.committed
+        if document is None or editor.object is None or editor.hand.is_busy:
             return
         name, k, item = editor.object.name, editor.current, editor.object
         if editor.object.is_locked:
@@ -151,7 +153,7 @@ class Objects:
             return
         for job in (SELECT, LIFT):  # what they would bring is for an object by its number
             editor.jobs.cancel(job)
-        left = edits.remove_object(editor.document, k)
+        left = edits.remove_object(document, k)
         editor.apply(t("Remove object"), left)
         self.choose(max(min(k, len(left.objects) - 1), 0))
         is_in_photo = not item.is_visitor and all(o.mask is not item.mask for o in left.objects)
@@ -186,7 +188,7 @@ class Objects:
     def toggle_front(self) -> None:
         """Keeps the current object in front of what is edited, as it is in the photo, or not."""
         editor, k = self._editor, self._editor.current
-        document, item = editor.document, editor.object
+        document, item = editor.committed, editor.object
         if document is None or item is None or editor.hand.is_busy:
             return
         if item.is_locked:
@@ -256,13 +258,12 @@ class Objects:
         """Object `k` to a place of `order`."""
         from objectmorpher_core.compose.order import reordered
 
-        editor = self._editor
-        if editor.document is None or editor.hand.is_busy:
+        editor, document = self._editor, self._editor.committed
+        if document is None or editor.hand.is_busy:
             return
         order = self.order()
         order.remove(k)
         order.insert(place, k)
-        document = editor.document
         posed = partial(editor.derived.posed, document)
         editor.apply(label, reordered(document, k, order, posed))
 

@@ -142,10 +142,10 @@ class Selection:
 
     def clear(self) -> None:
         """Clear the current object's selection."""
-        editor = self._editor
+        editor, document = self._editor, self._editor.committed
         editor.jobs.cancel(SELECT)
-        if editor.document is not None and editor.mask is not None:
-            cleared = edits.set_mask(editor.document, editor.current, None, Prompt())
+        if document is not None and editor.mask is not None:
+            cleared = edits.set_mask(document, editor.current, None, Prompt())
             self._masking.take(t("Clear selection"), cleared, editor.current)
 
     # Answers
@@ -366,7 +366,7 @@ class LeavingOut:
         from objectmorpher_core.compose.plate.plate import hole_margin
         from objectmorpher_core.compose.plate.residue import with_parts
 
-        editor, document, pieces = self._editor, self._editor.document, self.pieces
+        editor, document, pieces = self._editor, self._editor.committed, self.pieces
         thing = editor.object
         if document is None or document.plate is None or thing is None or thing.mask is None:
             return

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
@@ -30,7 +31,7 @@ from ...canvas.layer import CanvasLayer
 from ...system.texts import t
 from ...worker import job_functions
 from ..view import Painted
-from .composing import on_canvas, tint
+from .composing import GRAIN, on_canvas, tint
 
 if TYPE_CHECKING:
     from objectmorpher_core.lift.registration.imported import Import, ImportTarget
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
     from ..state import EditorState
     from ..tasks import Tasks
+    from .landing import Landing
     from .posing import Posing
 
 IMPORT = "import"  # kind of job
@@ -48,6 +50,10 @@ DEEPEST = 0.6  # x the object's size: no stroke goes on beyond
 NEARER, FARTHER, HIDDEN = (0xFF, 0xB0, 0x00), (0x5A, 0xA9, 0xFF), (0xB4, 0x8C, 0xFF)
 FULL_TINT = 0.2  # of nearness, that is shown at full strength
 TINT = 170  # of 255, its strength
+# What is painted is carried along with a moved object by a mesh of so many points a side.
+MESH, MARGIN = 24, 24  # px of the field that the mesh goes on around it
+STRIDE = 8  # px of a tint between places that are looked up in it
+BESIDE = 10.0  # px, off any field
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +69,8 @@ class Fitting:
 class Shaping:
     """The artist's words about a shape, and their effect."""
 
-    def __init__(self, editor: EditorState, posing: Posing, tasks: Tasks) -> None:
-        self._editor = editor
+    def __init__(self, editor: EditorState, landing: Landing, posing: Posing, tasks: Tasks) -> None:
+        self._editor, self._landing = editor, landing
         self._posing, self._tasks = posing, tasks
         self._stroke: Stroke | None = None
         self._painted, self._is_inverse = Painted.DEPTH, False
@@ -73,8 +79,8 @@ class Shaping:
 
     @property
     def settings(self) -> LiftSettings:
-        thing = self._editor.object
-        return thing.shape if thing is not None else AS_SEEN
+        """The words about the current object, also those that its shape does not follow yet."""
+        return self._tasks.wished or AS_SEEN
 
     @property
     def why_fixed(self) -> str | None:
@@ -123,17 +129,17 @@ class Shaping:
 
     def say(self, label: str, **words: object) -> None:
         """A word about the shape: fields of `LiftSettings`."""
-        self._take(label, replace(self.settings, **words))
-
-    def _take(self, label: str, shape: LiftSettings) -> None:
         editor, document = self._editor, self._editor.committed
         thing = editor.object
         if document is None or thing is None or self.why_fixed is not None:
             return
-        if thing.lifted is None:
-            editor.apply(label, edits.set_shape(document, editor.current, shape))
-        else:
-            self._tasks.lift(shape, label)
+        if thing.lifted is not None:
+            self._tasks.lift(label, **words)
+            return
+        shape = replace(self.settings, **words)
+        editor.apply(label, edits.set_shape(document, editor.current, shape))
+        if editor.current in self._tasks.wishes:  # it is being lifted without that word
+            self._tasks.lift()
 
     # Strokes
 
@@ -157,12 +163,13 @@ class Shaping:
 
     def paint(self, canvas_xy: np.ndarray) -> None:
         """The brush moves to canvas px (2,)."""
-        document = self._editor.document
-        if self._stroke is None or document is None:
+        document, stroke, landing = self._editor.document, self._stroke, self._landing
+        if stroke is None or document is None:
             return
         scale = _scale(document.photo.size) if self._painted is Painted.DEPTH else 1.0
-        x, y = self._editor.view.image_from_canvas(canvas_xy) * scale
-        self._stroke.move_to(float(x), float(y))
+        land = landing.begin if stroke.box is None else landing.go_on
+        x, y = land(canvas_xy) * scale
+        stroke.move_to(float(x), float(y))
 
     def end_stroke(self) -> None:
         """Turn what was painted into a hint about the shape."""
@@ -222,12 +229,40 @@ class Shaping:
             field, scale = self._hidden(size).astype(np.float32) * FULL_TINT, 1.0
         if not field.any():
             return None
-        seen = on_canvas(editor.view, field, scale)
+        seen = self._seen(document, field, scale)
         alpha = np.clip(np.abs(seen) / FULL_TINT, 0, 1)[..., None]
         up = HIDDEN if painted is Painted.HIDDEN else NEARER
         ink = np.where(seen[..., None] > 0, np.array(up, np.float32), np.array(FARTHER, np.float32))
         strength = alpha * (TINT / 255)
         return tint(ink * strength, 255 * strength)
+
+    def _seen(self, document: Document, field: F32, scale: float) -> F32:
+        """(h, w) a field over the canvas, each part of it where the object shows it now."""
+        view, k = self._editor.view, self._editor.current
+        if not self._landing.is_current_moved:
+            return on_canvas(view, field, scale)
+        from scipy.spatial import Delaunay
+
+        corners = [(v.min() - MARGIN, v.max() + MARGIN) for v in np.nonzero(field)[::-1]]
+        x, y = (np.linspace(low, high, MESH) / scale for low, high in corners)
+        photo = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)  # image px, around what is painted
+        shown = view.canvas_from_image(self._editor.derived.carried(document, k, photo)) / GRAIN
+        height, width = max(view.height // GRAIN, 1), max(view.width // GRAIN, 1)
+        rows, columns = height // STRIDE + 1, width // STRIDE + 1
+        tint_xy = (np.mgrid[:rows, :columns][::-1].reshape(2, -1).T + 0.5) * STRIDE
+        mesh = Delaunay(shown, qhull_options="QJ")  # also of what is seen from its edge
+        triangle = mesh.find_simplex(tint_xy)  # -1 beside it
+        to_shares = mesh.transform[triangle]
+        shares = np.einsum("nij,nj->ni", to_shares[:, :2], tint_xy - to_shares[:, 2])
+        shares = np.column_stack([shares, 1 - shares.sum(1)])  # of a triangle's corners
+        at = np.einsum("ni,nij->nj", shares, photo[mesh.simplices[triangle]]) * scale - 0.5
+        at[triangle < 0] = np.nan
+        at = at.astype(np.float32).reshape(rows, columns, 2)
+        fine = cv2.resize(at, (columns * STRIDE, rows * STRIDE))[:height, :width]
+        fine = np.where(np.isfinite(fine), fine, np.float32(-BESIDE))
+        return np.asarray(
+            cv2.remap(field, fine[..., 0], fine[..., 1], cv2.INTER_LINEAR), np.float32
+        )
 
     # Other photos of the object
 
@@ -351,11 +386,10 @@ class Shaping:
             changed = edits.set_lifted(changed, k, matte, lifted)
             return edits.set_placement(changed, k, Placement())
 
-        def show(changed: Document) -> None:
-            if not editor.hand.is_busy:
-                self._show_import(fitting, changed, label)
-
-        self._tasks.make_ready(k, change, t("Placing the object"), show)
+        self._tasks.make_ready(
+            k, change, t("Placing the object"),
+            lambda changed: self._show_import(fitting, changed, label),
+        )  # fmt: skip
 
     def _show_import(self, fitting: Fitting, changed: Document, label: str) -> None:
         editor = self._editor
