@@ -26,6 +26,7 @@ from ...system.texts import folder_of, t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
+from ..history import CLOCK
 from ..tasks import SELECT, WRITE
 from ..view import Action, ToolName
 from .composing import on_canvas, tint
@@ -58,6 +59,7 @@ class Masking:
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
         self._veil: tuple[tuple[object, ...], CanvasLayer] | None = None  # of what it was made
         self._waiting: list[MaskChange] = []  # the first one is being made
+        self.newest = 0  # number of the last one, as of the history's steps
 
     @property
     def shown(self) -> Selection | None:
@@ -168,8 +170,20 @@ class Masking:
     def _enqueue(self, change: MaskChange) -> None:
         """One after the other: three presses grow the selection three times."""
         self._waiting.append(change)
+        self.newest = next(CLOCK)
         if len(self._waiting) == 1:
             self._make_next()
+
+    @property
+    def undo_label(self) -> str | None:
+        """Of the last change that is not made yet; None: there is none."""
+        return self._waiting[-1].label if self._waiting else None
+
+    def take_back(self) -> None:
+        """Forget that change."""
+        self._waiting.pop()
+        if not self._waiting:
+            self._editor.jobs.cancel(CHANGE)
 
     def _make_next(self) -> None:
         editor, thing = self._editor, self._editor.object
@@ -187,6 +201,7 @@ class Masking:
                 return
             self._apply(change.label, changed)
             self._waiting.pop(0)
+            self.newest = next(CLOCK)
             self._make_next()
 
         editor.jobs.start(

@@ -16,6 +16,7 @@ from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
 from ...canvas.layer import CanvasLayer
 from ...system.texts import t
 from ...worker.requests import JobError
+from ..history import CLOCK
 from ..view import PaintWith
 from .composing import Answers, stroke_tint
 
@@ -123,6 +124,7 @@ class Painting:
         self._editor = editor
         self._stroke: _Laid | None = None  # being painted
         self._waiting: list[tuple[int, _Laid]] = []  # on which object; the first is worked on
+        self.newest = 0  # number of the last one, as of the history's steps
         self._aside: tuple[float, float] | None = None  # image px from the brush to its source
         self._answers = Answers(editor)
 
@@ -189,11 +191,12 @@ class Painting:
         if not laid.stroke.coverage[y0:y1, x0:x1].any():
             return
         self._waiting.append((self._editor.current, laid))
+        self.newest = next(CLOCK)
         if len(self._waiting) == 1:
             self._lay()
 
     @property
-    def waiting_label(self) -> str | None:
+    def undo_label(self) -> str | None:
         """Of the last stroke that is not on the object yet; None: there is none."""
         return _label(self._waiting[-1][1]) if self._waiting else None
 
@@ -281,6 +284,7 @@ class Painting:
                 if answer.is_mirrored:
                     editor.say(t("This back is the front mirrored: both are painted"))
         if self._waiting:
+            self.newest = next(CLOCK)
             self._lay()
 
     def painted_layer(self) -> CanvasLayer | None:
