@@ -255,12 +255,13 @@ class Editor(EditorState):
 
     def _travel(self, go: Callable[[], None], text: str) -> None:
         """Goes to another step, which may lack what the view points at."""
-        before = self.committed
+        before, own, history = self.committed, self.current, self.history
+        assert before is not None and history is not None
+        cursor = history.cursor
         go()
-        assert before is not None
-        self.objects.follow(before)
+        self.objects.follow(before, history.cursor > cursor)
         self.hover = Hover()
-        self.posing.forget_lost()
+        self.posing.follow(before.objects[own] if own < len(before.objects) else None)
         self.objects.forget_lost()
         if not self.is_lifted and self.view.tool is not ToolName.MASK:
             self.view.tool = ToolName.SELECT

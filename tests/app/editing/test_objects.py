@@ -235,6 +235,43 @@ def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
     assert copied.current == 0
 
 
+@pytest.mark.parametrize("tool", [ToolName.SELECT, ToolName.PLACE])
+def test_removing_is_undone_and_done_again_with_the_same_object(
+    three: Editor, tool: ToolName
+) -> None:
+    """Not with the one that has its number by then, nor with none."""
+    for k, left in ((0, "B"), (1, "C"), (2, "B")):
+        three.start(three.opened)
+        for each, name in enumerate("ABC"):
+            three.objects.rename(each, name)
+        three.objects.choose(k)
+        three.view.tool, gone = tool, three.chosen
+        run(three, "remove_object")
+        assert three.chosen.name == left
+        run(three, "undo")
+        assert three.chosen is gone
+        run(three, "redo")
+        assert three.chosen.name == left
+        run(three, "undo")
+
+
+def test_what_is_selected_stays_selected_where_another_handle_comes_and_goes(
+    editor: Editor, ball: Document
+) -> None:
+    lifted, document = ball.objects[0].lifted, ball
+    assert lifted is not None
+    for point in (0, 100, 200):
+        document = edits.add_handle(document, 0, lifted.control_points[point])
+    editor.start(document)
+    editor.posing.select(2, 1)
+    chosen = [editor.chosen.handles[h].control_point for h in (2, 1)]
+    editor.posing.remove(0)
+    for command in ("undo", "redo"):
+        run(editor, command)
+        now = [editor.chosen.handles[h].control_point for h in editor.posing.selected]
+        assert now == chosen
+
+
 def test_the_background_stays_until_that_of_one_object_more_is_made(
     editor: Editor, ball: Document
 ) -> None:

@@ -75,16 +75,20 @@ class Objects:
             editor.view.tool = ToolName.SELECT
         return restore
 
-    def follow(self, before: Document) -> None:
-        """After a step back or forth: the tools change the object that the step changed."""
+    def follow(self, before: Document, is_forth: bool) -> None:
+        """After a step back or forth: the tools change the object that the step changed.
+
+        Where objects are gone that is the one that they changed, or what is in its place now.
+        """
         editor, now = self._editor, self._editor.document
         if now is None:
             return
-        pairs = enumerate(zip(before.objects, now.objects, strict=False))
-        changed = [k for k, (old, new) in pairs if old is not new]
-        if len(now.objects) != len(before.objects):
-            changed = [min(len(before.objects), len(now.objects))]
-        if changed and editor.current not in changed:
+        changed, gone = _others(now, before), _others(before, now)
+        if len(now.objects) < len(before.objects):
+            editor.current -= sum(k < editor.current for k in gone)
+            if is_forth:  # else what is selected next takes the place of what was selected there
+                editor.current = max(min(editor.current, len(now.objects) - 1), 0)
+        elif changed and editor.current not in changed:
             editor.current = changed[0]
 
     def toggle_visible(self, k: int) -> None:
@@ -296,6 +300,11 @@ class Objects:
         if landing is not None:
             below = [other for other in self.listed()[landing:] if other != k]
             self._put(k, len(below), t("Change the order"))
+
+
+def _others(document: Document, but: Document) -> list[int]:
+    """The objects of one document that are not in the other as they are."""
+    return [k for k, o in enumerate(document.objects) if all(o is not one for one in but.objects)]
 
 
 # An object of one photo that is copied into another: kept in the program, pasted in any tab.
