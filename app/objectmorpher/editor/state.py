@@ -105,7 +105,8 @@ class EditorState:
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
         self.cache = Cache()
-        self.tab = Tab()  # the one that is shown; `tabs.py` has them all
+        self.tab = Tab()  # the one that is shown
+        self.all_tabs: tuple[Tab, ...] = (self.tab,)  # in the order of the bar
         self._preview: Document | None = None
         self.hover = Hover()
         self.pointer: Pointer | None = None  # where it is now, on the canvas
@@ -214,6 +215,11 @@ class EditorState:
     @property
     def is_saved(self) -> bool:
         return self.tab.is_saved
+
+    def is_opened(self, path: Path) -> bool:
+        """Whether any tab shows the photo of this file, which nothing may overwrite."""
+        sources = (tab.source for tab in self.all_tabs)
+        return any(own is not None and own.resolve() == path.resolve() for own in sources)
 
     def is_on_photo(self, canvas_xy: np.ndarray) -> bool:
         if self.photo_size is None:

@@ -242,6 +242,8 @@ class Masking:
         editor, selection = self._editor, self.shown
         if path.suffix.lower() != ".png":
             editor.complain(t("A mask is written as .png, not as {ending}", ending=path.suffix))
+        elif editor.is_opened(path):
+            editor.complain(t("The export would overwrite the opened photo; choose another name"))
         elif selection is not None:
             editor.jobs.start(
                 t("Exporting {name}", name=path.name), job_functions.write_coverage,
