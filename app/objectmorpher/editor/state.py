@@ -6,6 +6,7 @@ use; the editor (`editor.py`) puts them together. No GL, no ImGui, no window in 
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,6 +50,7 @@ class Tab:
     source: Path | None = None  # the photo's file
     current: int = 0  # index of the object that the tools change
     selected: tuple[int, ...] = ()  # handles, as the tab was left
+    mirrored: list[weakref.ref[Mask]] = field(default_factory=list)  # of objects with symmetry
     is_lifting: bool = False  # a lift was stopped when the tab was left
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
@@ -252,6 +254,7 @@ class EditorState:
     def forget_document(self) -> None:
         """No document is open."""
         self.tab.history = self.tab.path = self.tab.source = None
+        self.tab.mirrored = []
         self.preview = self.message = None
         self.hover = Hover()
 

@@ -53,7 +53,7 @@ class Masking:
 
     def __init__(self, editor: EditorState, landing: Landing, posing: Posing) -> None:
         self._editor = editor
-        self._landing, self._posing = landing, posing
+        self._landing, self._posing, self.mirroring = landing, posing, posing.mirroring
         self.painting: MaskPainting | None = None  # the stroke in progress
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
@@ -280,6 +280,8 @@ class Masking:
             self._posing.select(None)
             if editor.view.tool is not ToolName.MASK or is_empty:
                 editor.view.tool = ToolName.SELECT
+            if before is not None:
+                self.mirroring.carry(before, changed)
             editor.apply(label, changed)
 
         def start_over() -> None:

@@ -83,7 +83,6 @@ class Posing:
     def forget(self) -> None:
         """The document is closed."""
         self._solved = self._restless = None
-        self.mirroring.forget()
 
     @property
     def is_restless(self) -> bool:

@@ -180,6 +180,7 @@ class Selection:
             return
         if loses_work(editor.history.document, document, question.k):
             return
+        self._masking.mirroring.carry(editor.history.document, document)
         editor.history.amend(document, is_repeatable=False)
         if question.combine in (Combine.ANEW, Combine.REFINED):
             self._told = editor.mask, found.confidence
