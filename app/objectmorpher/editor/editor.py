@@ -172,7 +172,7 @@ class Editor(EditorState):
             if kind.startswith(READY):
                 self.chores.cancel(kind)
         self.exporting.close()
-        self.objects.carried = None
+        self.objects.carried = self.objects.renaming = None
         self.tasks.forget()
         self.refits.forget()
         self.edging.forget()

@@ -27,7 +27,7 @@ from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
 from ..history import CLOCK
-from ..tasks import SELECT, WRITE
+from ..tasks import READ_MASK, SELECT, WRITE
 from ..view import Action, ToolName
 from .composing import on_canvas, tint
 
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from .posing import Posing
 
 CHANGE = "change mask"  # kind of job
-READ_MASK = "read mask"
 
 
 @dataclass(frozen=True)

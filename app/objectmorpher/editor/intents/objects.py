@@ -18,7 +18,7 @@ from ...canvas.shape import CanvasShape, build_shape, rehearse
 from ...system import clipboard
 from ...system.texts import t
 from ...worker.requests import LIFT, JobError
-from ..tasks import SELECT
+from ..tasks import READ_MASK, SELECT
 from ..view import USUAL_LEVEL, Action, StatusMessage, ToolName
 from .composing import USUAL_SHADOW
 
@@ -153,7 +153,11 @@ class Objects:
         if editor.object.is_locked:
             editor.say_locked(k)
             return
-        for job in (SELECT, LIFT):  # what they would bring is for an object by its number
+        for job in (
+            SELECT,
+            LIFT,
+            READ_MASK,
+        ):  # what they would bring is for an object by its number
             editor.jobs.cancel(job)
         left = edits.remove_object(editor.document, k)
         editor.apply(t("Remove object"), left)
