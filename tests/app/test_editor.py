@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from editor_steps import CENTRE, lift_ball, open_file, wait_for_jobs
+from editor_steps import CENTRE, lift_ball, open_file, wait_for_jobs, wait_until
 from objectmorpher.commands import COMMANDS, next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
@@ -18,6 +18,7 @@ from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.brush_tools import MaskTool
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher.worker.requests import LIFT
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
@@ -114,6 +115,16 @@ def test_undo_while_selecting_takes_the_click_back(editor: Editor) -> None:
     wait_for_jobs(editor)
     assert editor.selection.pending is None
     assert editor.mask is None
+
+
+def test_a_lift_that_is_promised_comes_after_further_clicks_too(editor: Editor) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    editor.tasks.lift_when_selected()
+    editor.selection.add_click(10, 10, False)
+    wait_until(editor, lambda: editor.jobs.is_busy(LIFT))
+    assert len(editor.selection.prompt.clicks) == 2
+    editor.jobs.cancel(LIFT)
+    wait_for_jobs(editor)
 
 
 def test_clicks_before_the_first_answer_are_one(editor: Editor) -> None:

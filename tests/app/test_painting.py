@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from editor_steps import wait_until
+from editor_steps import CENTRE, duplicate, wait_until
 from objectmorpher.canvas.frame import build_frame
 from objectmorpher.canvas.layer import FrameObject
 from objectmorpher.commands import COMMANDS, run
@@ -124,6 +124,33 @@ def test_ctrl_click_takes_a_colour_and_where_to_clone_from(painting: Editor):
     cloned = colour_at(editor.document, (92.0, 80.0))
     assert np.abs(cloned - document.photo.pixels[20, 20]).max() < 2 * NEAR
     assert np.abs(cloned - colour_at(document, (92.0, 80.0))).max() > 2 * NEAR
+
+
+@pytest.mark.parametrize("is_behind", [False, True])
+def test_what_is_seen_is_taken_from_another_object_too(
+    editor: Editor, ball: Document, is_behind: bool
+):
+    """As the picture shows it: also where the object that is painted on hides a part of it."""
+    duplicate(editor, ball, 50.0, 0.0)
+    editor.objects.choose(0)
+    editor.placing.move_to(Placement(move=(20.0, 30.0)))
+    editor.commit("Move object")
+    if is_behind:
+        run(editor, "to_front")
+    editor.view.compose.is_painting = True
+    document, at = editor.opened, np.array((CENTRE[0] + 50, CENTRE[1]))
+    both = np.array((CENTRE[0] + 30, CENTRE[1] + 15))  # where both balls are
+    for place in (at, both):
+        editor.painting.pick(editor.view.canvas_from_image(place))
+        taken = 255 * np.array(editor.view.compose.ink)
+        assert np.abs(taken - colour_at(document, (place[0], place[1]))).max() < 12
+    editor.view.compose.paint_with, editor.view.brush = PaintWith.CLONE, Brush(4.0, 1.0)
+    editor.view.tool = ToolName.COMPOSE
+    stroke(editor, ComposeTool(), editor.view.canvas_from_image(at), ctrl=True)
+    spot = (CENTRE[0] + 5, CENTRE[1] + 50)
+    paint(editor, spot)
+    cloned = colour_at(editor.opened, spot)
+    assert np.abs(cloned - colour_at(document, (at[0], at[1]))).max() < NEAR
 
 
 def test_what_is_locked_takes_none_and_beside_the_object_there_is_nothing(painting: Editor):

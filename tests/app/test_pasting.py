@@ -347,6 +347,25 @@ def test_in_its_own_photo_it_is_a_copy(editor: Editor, ball: Document) -> None:
     wait_for_jobs(editor)
 
 
+def test_in_its_own_photo_it_is_as_it_was_copied(editor: Editor, ball: Document) -> None:
+    """Whatever was done to the original since."""
+    editor.tabs.open(ball)
+    editor.placing.nudge(5.0, 0.0)
+    run(editor, "copy_object")
+    editor.placing.nudge(40.0, 0.0)
+    run(editor, "decontaminate")
+    for count in (2, 3):
+        run(editor, "paste_object")
+        wait_until(editor, lambda n=count: len(editor.opened.objects) == n)
+        twin, original = editor.chosen, editor.opened.objects[0]
+        assert editor.current == count - 1 and not twin.is_visitor
+        assert twin.placement.move == (5.0, 0.0) and twin.decontaminate == 0
+        assert original.placement.move[0] > 44 and original.decontaminate == 1
+        assert editor.message is not None
+        assert ("exactly over" in editor.message.text) == (count == 3), "the first paste is there"
+    close_all(editor)
+
+
 def test_light_between_photos_is_taken_on_within_bounds() -> None:
     grey, warm = (0.2, 0.2, 0.2), (0.4, 0.2, 0.1)
     for own, now in ((None, grey), (grey, None), (grey, grey), ((0.0, 0.2, 0.0), (0.2, 0.0, 0.2))):

@@ -353,3 +353,27 @@ def test_a_word_about_a_shape_that_was_left_is_heeded_when_one_comes_back(tabs: 
     assert tabs.shaping.settings.back == "auto"
     go(tabs, first)
     wait_until(tabs, lambda: tabs.chosen.shape.back == "mirrored")
+
+
+def test_no_file_of_another_tab_is_overwritten(
+    editor: Editor, ball: Document, photo_path: Path, tmp_path: Path
+) -> None:
+    """Neither its photo, by a picture or a mask, nor its session."""
+    session, photo = tmp_path / "one.omorph", photo_path.read_bytes()
+    open_file(editor, photo_path)
+    editor.filing.save_as(session)
+    wait_for_jobs(editor)
+    first, written = editor.tab, session.read_bytes()
+    editor.tabs.open(ball)
+    for tab in (editor.tab, first):
+        go(editor, tab)
+        for write in (editor.exporting.export_to, editor.masking.write_file):
+            editor.message = None
+            write(photo_path)
+            assert editor.message is not None and "overwrite the opened" in editor.message.text
+    go(editor, next(tab for tab in editor.tabs.all if tab is not first))
+    editor.filing.save_as(session)
+    assert editor.message is not None and "open in another tab" in editor.message.text
+    wait_for_jobs(editor)
+    assert photo_path.read_bytes() == photo and session.read_bytes() == written
+    close_all(editor)

@@ -8,15 +8,18 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from editor_steps import not_lifted, wait_for_jobs
+from editor_steps import not_lifted, wait_for_jobs, wait_until
 from hands import PATIENCE, ROOT
 from objectmorpher.commands import COMMANDS, GROUPS, run, why_not
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import ToolName
+from objectmorpher.editor.view import Painted, ToolName
+from objectmorpher.tools.brush_tools import ComposeTool, MaskTool
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
+from strokes import stroke
 from tests.tree import PYTHONPATH
 
 ELSEWHERE = {  # not about an edit
@@ -105,6 +108,51 @@ def test_a_snapshot_is_gone_back_to_as_a_step(editor: Editor, ball: Document) ->
     assert editor.committed is moved
     run(editor, "undo")
     assert editor.committed is ball
+
+
+@pytest.mark.parametrize("kind", ["edge", "selection", "background"])
+def test_undo_goes_by_the_order_in_which_things_were_done(
+    editor: Editor, ball: Document, kind: str
+) -> None:
+    """What is still computed is taken back where it was begun last, and not before its turn."""
+    tools = {"edge": MaskTool(), "background": ComposeTool()}
+    labels = {
+        "edge": "Edge brush",
+        "selection": "Grow selection",
+        "background": "Repair background",
+    }
+    editor.start(ball)
+    editor.view.tool = ToolName.COMPOSE if kind == "background" else ToolName.MASK
+    editor.view.compose.is_bare = kind == "background"
+    editor.view.selecting.painted = Painted.EDGE
+
+    def begin() -> None:
+        if kind == "selection":
+            run(editor, "grow")
+        else:
+            at = editor.view.canvas_from_image(np.array([(60.0, 60.0), (60.0, 80.0)]))
+            stroke(editor, tools[kind], *at)
+
+    editor.placing.nudge(5.0, 0.0)
+    first = editor.committed
+    begin()
+    editor.placing.nudge(0.0, 5.0)
+    assert editor.undo_label == "Nudge object"
+    run(editor, "undo")
+    assert editor.committed is first and editor.undo_label == labels[kind]
+    run(editor, "undo")
+    wait_for_jobs(editor)
+    assert editor.committed is first, "nothing comes of what was taken back"
+    assert editor.history is not None and editor.history.redo_label == "Nudge object"
+    begin()
+    begin()
+    wait_until(editor, lambda: editor.committed is not first)
+    assert editor.undo_label == labels[kind]
+    run(editor, "undo")
+    wait_for_jobs(editor)
+    assert editor.history.steps == ("Open", "Nudge object", labels[kind]), "the second is gone"
+    run(editor, "undo")
+    assert editor.committed is first
 
 
 @pytest.mark.window

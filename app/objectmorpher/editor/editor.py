@@ -174,7 +174,7 @@ class Editor(EditorState):
             if kind.startswith(READY):
                 self.chores.cancel(kind)
         self.exporting.close()
-        self.objects.carried = None
+        self.objects.carried = self.objects.renaming = None
         self.answers.forget()
         self.tasks.forget()
         self.masking.forget()
@@ -198,8 +198,17 @@ class Editor(EditorState):
     @property
     def undo_label(self) -> str | None:
         """Of what `undo` takes back: a stroke that is not laid yet, or the last step; or None."""
-        waiting = self.painting.waiting_label or self.composing.waiting_label
-        return waiting or (None if self.history is None else self.history.undo_label)
+        waiting = self._newest_waiting
+        return (waiting or self.history).undo_label if self.history is not None else None
+
+    @property
+    def _newest_waiting(self) -> Painting | Composing | Edging | Masking | None:
+        """What has a stroke that is not laid yet and came after the last step; None: nothing."""
+        waiting = (self.painting, self.composing, self.edging, self.masking)
+        newest = max(waiting, key=lambda strokes: strokes.newest if strokes.undo_label else -1)
+        step = None if self.history is None else self.history.step
+        is_newer = newest.undo_label and step is not None and newest.newest > step.number
+        return newest if is_newer else None
 
     def undo(self) -> None:
         if self.hand.abort(self) or self.history is None:
@@ -209,11 +218,10 @@ class Editor(EditorState):
             return
         label = self.undo_label
         text = t("Undone: {label}", label=label) if label else t("Nothing to undo")
-        for strokes in (self.painting, self.composing):
-            if strokes.waiting_label is not None:
-                strokes.take_back()
-                self.say(text)
-                return
+        if (strokes := self._newest_waiting) is not None:
+            strokes.take_back()
+            self.say(text)
+            return
         self._travel(self.history.undo, text)
 
     def redo(self) -> None:
@@ -251,12 +259,13 @@ class Editor(EditorState):
 
     def _travel(self, go: Callable[[], None], text: str) -> None:
         """Goes to another step, which may lack what the view points at."""
-        before, self.preview = self.committed, None
+        before, own, history = self.committed, self.current, self.history
+        assert before is not None and history is not None
+        cursor, self.preview = history.cursor, None
         go()
-        assert before is not None
-        self.objects.follow(before)
+        self.objects.follow(before, history.cursor > cursor)
         self.hover = Hover()
-        self.posing.forget_lost()
+        self.posing.follow(before.objects[own] if own < len(before.objects) else None)
         self.objects.forget_lost()
         if not self.is_lifted and self.view.tool is not ToolName.MASK:
             self.view.tool = ToolName.SELECT

@@ -323,6 +323,11 @@ class Filing:
             self._editor.complain(sentence)
             self._end_saving()
             return
+        if any(tab.path == path and tab is not self._editor.tab for tab in self._tabs.all):
+            sentence = t("{name} is open in another tab; choose another name", name=path.name)
+            self._editor.complain(sentence)
+            self._end_saving()
+            return
         self._tasks.save(path, then, self._end_saving)
 
     def _end_saving(self) -> None:

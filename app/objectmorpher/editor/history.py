@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from objectmorpher_core.document.model import Document
 
 DEPTH = 10_001  # steps: a day's ten thousand edits, and the one that undoing them all leaves
 LIMIT = 1 << 30  # bytes that old steps may hold beside what the shown document holds
+CLOCK = count()  # what was done later has a higher number: steps, and strokes that are none yet
 
 
 @dataclass(eq=False)
@@ -27,6 +29,7 @@ class Step:
 
     label: str  # "Move handle"
     document: Document
+    number: int = field(default_factory=lambda: next(CLOCK))
 
 
 class History:
@@ -100,7 +103,7 @@ class History:
             self._saved = document if step.document is self._saved else self._saved
             step.document = document
         else:
-            self._steps[self._cursor] = Step(step.label, document)
+            self._steps[self._cursor] = replace(step, document=document)
         self._memory.take(document)
         self._forget_oldest()
 

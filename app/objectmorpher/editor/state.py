@@ -6,6 +6,7 @@ use; the editor (`editor.py`) puts them together. No GL, no ImGui, no window in 
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -102,6 +103,7 @@ class Tab:
     current: int = 0  # index of the object that the tools change
     selected: tuple[int, ...] = ()  # handles, as the tab was left
     wishes: dict[int, Wish] = field(default_factory=dict)  # lifts that were stopped then
+    mirrored: list[weakref.ref[Mask]] = field(default_factory=list)  # of objects with symmetry
     shapes: Shapes = ()  # of its objects; kept for the tab that was left last
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
     composed: dict[str, Any] = field(default_factory=dict)  # OWN_COMPOSE, likewise
@@ -162,7 +164,8 @@ class EditorState:
         self.chores = Chores(wake)
         self.answers = Answers(self)
         self.cache = Cache()
-        self.tab = Tab()  # the one that is shown; `tabs.py` has them all
+        self.tab = Tab()  # the one that is shown
+        self.all_tabs: tuple[Tab, ...] = (self.tab,)  # in the order of the bar
         self._preview: Document | None = None
         self.hover = Hover()
         self.pointer: Pointer | None = None  # where it is now, on the canvas
@@ -272,6 +275,11 @@ class EditorState:
     def is_saved(self) -> bool:
         return self.tab.is_saved
 
+    def is_opened(self, path: Path) -> bool:
+        """Whether any tab shows the photo of this file, which nothing may overwrite."""
+        sources = (tab.source for tab in self.all_tabs)
+        return any(own is not None and own.resolve() == path.resolve() for own in sources)
+
     def is_on_photo(self, canvas_xy: np.ndarray) -> bool:
         if self.photo_size is None:
             return False
@@ -303,6 +311,7 @@ class EditorState:
     def forget_document(self) -> None:
         """No document is open."""
         self.tab.history = self.tab.path = self.tab.source = None
+        self.tab.mirrored = []
         self.preview = self.message = None
         self.hover = Hover()
 

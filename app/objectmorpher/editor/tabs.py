@@ -37,9 +37,12 @@ class Tabs:
         """`start` shows a new document in the tab that is shown; `leave` stops what runs for it."""
         self._editor, self._posing, self._tasks = editor, posing, tasks
         self._start, self._leave = start, leave
-        self.all: tuple[Tab, ...] = (editor.tab,)
         self.aimed: Tab | None = None  # an object that is dragged would be let go on it
         self._ended: list[Autosave] = []  # of tabs that were closed
+
+    @property
+    def all(self) -> tuple[Tab, ...]:
+        return self._editor.all_tabs
 
     def open(self, document: Document, shapes: Shapes = ()) -> None:
         """Shows a document that was read: in a new tab, or in the place of the start screen."""
@@ -64,7 +67,7 @@ class Tabs:
     def add(self) -> None:
         """The start screen in a new tab, beside the one that is shown."""
         tab, at = Tab(), self.all.index(self._editor.tab) + 1
-        self.all = (*self.all[:at], tab, *self.all[at:])
+        self._editor.all_tabs = (*self.all[:at], tab, *self.all[at:])
         self._show(tab)
 
     def go(self, tab: Tab, then: Callable[[], None] = lambda: None) -> None:
@@ -98,7 +101,7 @@ class Tabs:
     def move(self, tab: Tab, at: int) -> None:
         """Puts a tab at another place of the bar."""
         others = [other for other in self.all if other is not tab]
-        self.all = (*others[:at], tab, *others[at:])
+        self._editor.all_tabs = (*others[:at], tab, *others[at:])
 
     def close(self, tab: Tab) -> None:
         """Closes a tab for good; nothing is asked here. The last one becomes the start screen."""
@@ -114,7 +117,7 @@ class Tabs:
     def _drop(self, tab: Tab) -> None:
         if tab is self._editor.tab or tab not in self.all:
             return
-        self.all = tuple(other for other in self.all if other is not tab)
+        self._editor.all_tabs = tuple(other for other in self.all if other is not tab)
         tab.history, tab.shapes = None, ()
         tab.autosave.end()
         self._ended.append(tab.autosave)

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 
 REHEARSE, FRONT = "rehearse", "front"  # kinds of what runs in a thread, beside READY
 READ, SELECT, PLATE, WRITE = "read", "segment", "plate", "write"  # kinds of jobs, beside LIFT
+READ_MASK = "read mask"  # and of the file of one
 
 
 Wanted = tuple[Mask | Hint | None, ...]  # what a background depends on: masks, then hints

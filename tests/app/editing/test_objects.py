@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from editor_steps import CENTRE, HEIGHT, WIDTH, duplicate, wait_for_jobs, wait_until
+from editor_steps import CENTRE, HEIGHT, WIDTH, close_all, duplicate, wait_for_jobs, wait_until
 from objectmorpher.canvas.frame import build_frame, drawn_order
 from objectmorpher.commands import COMMANDS, run, why_not
 from objectmorpher.editor.editor import Editor
@@ -233,6 +233,63 @@ def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
     copied.travel(copied.history.cursor - 1)
     assert copied.document is not None and copied.document.objects[0].is_visible
     assert copied.current == 0
+
+
+@pytest.mark.parametrize("tool", [ToolName.SELECT, ToolName.PLACE])
+def test_removing_is_undone_and_done_again_with_the_same_object(
+    three: Editor, tool: ToolName
+) -> None:
+    """Not with the one that has its number by then, nor with none."""
+    for k, left in ((0, "B"), (1, "C"), (2, "B")):
+        three.start(three.opened)
+        for each, name in enumerate("ABC"):
+            three.objects.rename(each, name)
+        three.objects.choose(k)
+        three.view.tool, gone = tool, three.chosen
+        run(three, "remove_object")
+        assert three.chosen.name == left
+        run(three, "undo")
+        assert three.chosen is gone
+        run(three, "redo")
+        assert three.chosen.name == left
+        run(three, "undo")
+
+
+def test_what_is_selected_stays_selected_where_another_handle_comes_and_goes(
+    editor: Editor, ball: Document
+) -> None:
+    lifted, document = ball.objects[0].lifted, ball
+    assert lifted is not None
+    for point in (0, 100, 200):
+        document = edits.add_handle(document, 0, lifted.control_points[point])
+    editor.start(document)
+    editor.posing.select(2, 1)
+    chosen = [editor.chosen.handles[h].control_point for h in (2, 1)]
+    editor.posing.remove(0)
+    for command in ("undo", "redo"):
+        run(editor, command)
+        now = [editor.chosen.handles[h].control_point for h in editor.posing.selected]
+        assert now == chosen
+
+
+def test_a_mask_that_is_read_does_not_go_to_another_object(three: Editor, tmp_path: Path) -> None:
+    """One before it is removed meanwhile: its number is another one's then."""
+    path, left = tmp_path / "mask.png", three.opened.objects[1:]
+    assert three.mask is not None
+    Image.fromarray((three.mask | np.roll(three.mask, 1, 1)).astype(np.uint8) * 255).save(path)
+    three.objects.choose(1)
+    three.masking.open_file(path)
+    three.objects.choose(0)
+    run(three, "remove_object")
+    wait_for_jobs(three)
+    assert three.opened.objects == left
+
+
+def test_a_name_is_not_typed_on_in_another_tab(copied: Editor) -> None:
+    run(copied, "rename")
+    copied.tabs.add()
+    assert copied.objects.renaming is None
+    close_all(copied)
 
 
 def test_the_background_stays_until_that_of_one_object_more_is_made(

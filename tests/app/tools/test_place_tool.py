@@ -241,10 +241,15 @@ def test_arrows_nudge_the_object_by_pixels(placed: Editor) -> None:
 
 
 def test_each_group_of_numbers_goes_back_by_itself(placed: Editor) -> None:
+    """Turn and size about the foot of what stands, as they are changed."""
+    foot = placed.placing.pivot()
     run(placed, "reset_turn")
-    assert placed.placing.placement == Placement(START.move, START.depth, (0, 0, 0), START.scale)
+    placement = placed.placing.placement
+    assert placement is not None and (placement.turn, placement.scale) == ((0, 0, 0), START.scale)
+    assert np.allclose(placed.placing.pivot(), foot, atol=EXACT)
     assert why_not(placed, "reset_turn") == "The object is not turned"
     run(placed, "reset_size")
+    assert np.allclose(placed.placing.pivot(), foot, atol=EXACT)
     run(placed, "reset_position")
     assert placed.placing.placement == Placement()
     assert why_not(placed, "reset_place") == "The object is where it was in the photo"
@@ -309,6 +314,22 @@ def test_it_stays_on_the_ground_whatever_is_done(grounded: Editor, part: str) ->
         stroke(grounded, shown.arrow.at(shown.arrow.far + 20), shown.arrow.at(shown.arrow.far))
     assert grounded.placing.placement != Placement()
     assert abs(below_ground(grounded)) < EXACT
+
+
+@pytest.mark.parametrize("command", ["reset_turn", "reset_size"])
+def test_it_goes_back_in_turn_or_size_by_the_way_it_came(grounded: Editor, command: str) -> None:
+    """It neither floats nor sinks, and is where it was before it was turned or scaled."""
+    placing, start = grounded.placing, grounded.placing.stood(Placement((9.0, 0.0)))
+    placing.move_to(start)
+    grounded.commit("Move")
+    pitched, larger = placing.turned_to(start, (0.0, 60.0, 0.0)), placing.scaled(start, 1.6)
+    placing.move_to(pitched if command == "reset_turn" else larger)
+    grounded.commit("Change")
+    run(grounded, command)
+    assert abs(below_ground(grounded)) < EXACT
+    back = placing.placement
+    assert back is not None and (back.turn, back.scale) == (start.turn, start.scale)
+    assert np.allclose((*back.move, back.depth), (*start.move, start.depth), atol=EXACT)
 
 
 def test_the_horizon_can_be_dragged_and_is_one_step(grounded: Editor) -> None:

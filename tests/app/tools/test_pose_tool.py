@@ -7,13 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from editor_steps import CENTRE, RADII
+from editor_steps import CENTRE, RADII, close_all, wait_until
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import PoseView, ToolName
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.pose_tool import RING, PoseTool
 from objectmorpher_core.base.rotations import matrix_from_vector
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.hold_edits import Stays
 from objectmorpher_core.document.model import Document
 from strokes import move, press, release
@@ -333,3 +334,24 @@ def test_symmetry_is_of_one_object_of_one_photo(posed: Editor, ball: Document) -
     assert posed.posing.mirroring.is_on
     posed.start(ball)
     assert not posed.posing.mirroring.is_on
+
+
+def test_symmetry_stays_on_while_the_outline_is_painted_and_in_its_tab(
+    posed: Editor, ball: Document
+) -> None:
+    mirroring, mask, tab = posed.posing.mirroring, ball.objects[0].mask, posed.tab
+    assert mask is not None
+    run(posed, "mirror")
+    painted = edits.change_mask(ball, 0, mask | np.roll(mask, 1, axis=1))
+    posed.masking.take("Paint selection", painted, 0)
+    assert posed.is_lifted and posed.mask is not mask and mirroring.is_on
+    posed.undo()
+    assert mirroring.is_on
+    posed.tabs.open(ball)
+    assert not mirroring.is_on
+    posed.tabs.go(tab)
+    wait_until(posed, lambda: posed.tab is tab)
+    assert mirroring.is_on
+    run(posed, "mirror")
+    assert not mirroring.is_on
+    close_all(posed)

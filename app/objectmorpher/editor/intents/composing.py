@@ -22,6 +22,7 @@ from ...system.texts import t
 from ...worker import job_functions
 from ...worker.job_functions import BackendChoice, Variant
 from ...worker.requests import JobError
+from ..history import CLOCK
 from ..state import Answers
 from ..tasks import PLATE
 from ..view import ToolName, ViewState
@@ -57,6 +58,7 @@ class Composing:
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
+        self.newest = 0  # number of the last one, as of the history's steps
         # A variant that is looked at: of what and which, and the document with it
         self._compared: tuple[tuple[Document, Plate], Document] | None = None
 
@@ -240,6 +242,7 @@ class Composing:
     def _enqueue(self, stroke: Stroke) -> None:
         """One after the other."""
         self._waiting.append(stroke)
+        self.newest = next(CLOCK)
         if len(self._waiting) == 1:
             self._ask_repair()
 
@@ -275,7 +278,7 @@ class Composing:
         return bool(self._waiting) and self._waiting[0] is stroke
 
     @property
-    def waiting_label(self) -> str | None:
+    def undo_label(self) -> str | None:
         """Of the last stroke that is not filled in yet; None: there is none."""
         return t("Repair background") if self._waiting else None
 
@@ -298,6 +301,7 @@ class Composing:
             plate = with_patch(document, patch, backend)
             editor.apply(t("Repair background"), edits.set_plate(document, plate))
         if self._waiting:
+            self.newest = next(CLOCK)
             self._ask_repair()
 
     def painted_layer(self) -> CanvasLayer | None:

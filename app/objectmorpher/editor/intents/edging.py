@@ -20,6 +20,7 @@ from ...system.texts import t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
+from ..history import CLOCK
 
 if TYPE_CHECKING:
     from ..state import EditorState
@@ -39,6 +40,11 @@ class EdgeWish:
     painted: Mask  # (H, W)
     is_erasing: bool
 
+    @property
+    def label(self) -> str:
+        """Of the step that it becomes."""
+        return t("Erase edge brush") if self.is_erasing else t("Edge brush")
+
 
 class Edging:
     """The current object's soft edge."""
@@ -50,6 +56,7 @@ class Edging:
         self.is_erasing = False
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._waiting: list[EdgeWish] = []  # the first one is being done
+        self.newest = 0  # number of the last one, as of the history's steps
         self._spill: tuple[F32, F32] | None = None  # of which colours, and what is in them
 
     def forget(self) -> None:
@@ -93,8 +100,20 @@ class Edging:
         self._waiting.append(
             EdgeWish(document.photo, self._editor.current, painted, self.is_erasing)
         )
+        self.newest = next(CLOCK)
         if len(self._waiting) == 1:
             self._do_next()
+
+    @property
+    def undo_label(self) -> str | None:
+        """Of the last stroke whose edge is not found yet; None: there is none."""
+        return self._waiting[-1].label if self._waiting else None
+
+    def take_back(self) -> None:
+        """Forget that stroke."""
+        self._waiting.pop()
+        if not self._waiting:
+            self._editor.jobs.cancel(BRUSH_EDGE)
 
     def _do_next(self) -> None:
         from objectmorpher_core.segment.matting.repair import EdgeStroke
@@ -106,13 +125,19 @@ class Edging:
             self._waiting.clear()
             return
 
+        def is_next() -> bool:
+            return bool(self._waiting) and self._waiting[0] is wish
+
         def accept(answer: tuple[U8, Mask]) -> None:
+            if not is_next():  # it was taken back
+                return
             now = self._thing_of(wish)
             if now is None or now.selection is not thing.selection:
                 self._waiting.clear()
                 return
             self._take(wish, *answer)
             self._waiting.pop(0)
+            self.newest = next(CLOCK)
             self._do_next()
 
         def fail(error: JobError) -> None:
@@ -123,7 +148,8 @@ class Edging:
             t("Looking for the edge"), job_functions.brush_edge,
             EdgeStroke(wish.photo.pixels, thing.selection, thing.mixed, wish.painted),
             wish.is_erasing, done=lambda answer: editor.answers.take(lambda: accept(answer)),
-            failed=fail, cancelled=self._waiting.clear, kind=BRUSH_EDGE,
+            failed=fail, cancelled=lambda: self._waiting.clear() if is_next() else None,
+            kind=BRUSH_EDGE,
         )  # fmt: skip
 
     def _thing_of(self, wish: EdgeWish) -> EditObject | None:
@@ -137,13 +163,12 @@ class Edging:
         """What the brush has found is the next step."""
         editor, document = self._editor, self._editor.committed
         assert document is not None
-        label = t("Erase edge brush") if wish.is_erasing else t("Edge brush")
         try:
             changed = edge_edits.set_edge(document, wish.k, coverage, mixed)
         except edits.EditError as error:
             editor.complain(str(error))
             return
-        self._masking.take(label, changed, wish.k)
+        self._masking.take(wish.label, changed, wish.k)
 
     # The background's colour
 

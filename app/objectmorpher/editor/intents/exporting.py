@@ -296,7 +296,7 @@ class Exporting:
                 t("a photo cannot be written as {ending}; choose {known}",
                   ending=path.suffix, known=KNOWN)
             )  # fmt: skip
-        elif self._is_opened(path):
+        elif editor.is_opened(path):
             editor.complain(t("the export would overwrite the opened photo; choose another name"))
         else:
             is_whole = format in LOSSLESS_AT_100
@@ -411,14 +411,10 @@ class Exporting:
         """Why nothing can be written to `path`, or None."""
         if not path.parent.is_dir():
             return t("There is no folder {folder}", folder=path.parent)
-        if self._is_opened(path):
+        if self._editor.is_opened(path):
             return t("The export would overwrite the opened photo; choose another name")
         is_taken = path.is_dir() and (not path.name or not self.is_folder)
         return t("{name} is a folder", name=path.name or path) if is_taken else None
-
-    def _is_opened(self, path: Path) -> bool:
-        source = self._editor.source
-        return source is not None and path.resolve() == source.resolve()
 
     def _remember(self, draft: Draft, path: Path) -> None:
         editor = self._editor

@@ -26,7 +26,8 @@ from ...system.texts import folder_of, t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
-from ..tasks import SELECT, WRITE
+from ..history import CLOCK
+from ..tasks import READ_MASK, SELECT, WRITE
 from ..view import Action, ToolName
 from .composing import on_canvas, tint
 
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from .posing import Posing
 
 CHANGE = "change mask"  # kind of job
-READ_MASK = "read mask"
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,13 @@ class Masking:
 
     def __init__(self, editor: EditorState, landing: Landing, posing: Posing) -> None:
         self._editor = editor
-        self._landing, self._posing = landing, posing
+        self._landing, self._posing, self.mirroring = landing, posing, posing.mirroring
         self.painting: MaskPainting | None = None  # the stroke in progress
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
         self._veil: tuple[tuple[object, ...], CanvasLayer] | None = None  # of what it was made
         self._waiting: list[MaskChange] = []  # the first one is being made
+        self.newest = 0  # number of the last one, as of the history's steps
 
     @property
     def shown(self) -> Selection | None:
@@ -168,8 +169,20 @@ class Masking:
     def _enqueue(self, change: MaskChange) -> None:
         """One after the other: three presses grow the selection three times."""
         self._waiting.append(change)
+        self.newest = next(CLOCK)
         if len(self._waiting) == 1:
             self._make_next()
+
+    @property
+    def undo_label(self) -> str | None:
+        """Of the last change that is not made yet; None: there is none."""
+        return self._waiting[-1].label if self._waiting else None
+
+    def take_back(self) -> None:
+        """Forget that change."""
+        self._waiting.pop()
+        if not self._waiting:
+            self._editor.jobs.cancel(CHANGE)
 
     def _make_next(self) -> None:
         editor, thing = self._editor, self._editor.object
@@ -180,20 +193,27 @@ class Masking:
             return
         change, k = self._waiting[0], editor.current
 
+        def is_next() -> bool:
+            return bool(self._waiting) and self._waiting[0] is change
+
         def accept(changed: Selection) -> None:
+            if not is_next():  # it was taken back
+                return
             now = editor.object.selection if editor.object else None
             if now is not thing.selection or editor.current != k:
                 self.forget()
                 return
             self._apply(change.label, changed)
             self._waiting.pop(0)
+            self.newest = next(CLOCK)
             self._make_next()
 
         editor.jobs.start(
             t("Changing the selection"), job_functions.change_mask,
             thing.selection, change.function,
             done=lambda changed: editor.answers.take(lambda: accept(changed)),
-            failed=lambda error: self._fail(error, change), cancelled=self.forget, kind=CHANGE,
+            failed=lambda error: self._fail(error, change),
+            cancelled=lambda: self.forget() if is_next() else None, kind=CHANGE,
         )  # fmt: skip
 
     def forget(self) -> None:
@@ -229,6 +249,8 @@ class Masking:
         editor, selection = self._editor, self.shown
         if path.suffix.lower() != ".png":
             editor.complain(t("A mask is written as .png, not as {ending}", ending=path.suffix))
+        elif editor.is_opened(path):
+            editor.complain(t("The export would overwrite the opened photo; choose another name"))
         elif selection is not None:
             editor.jobs.start(
                 t("Exporting {name}", name=path.name), job_functions.write_coverage,
@@ -265,6 +287,8 @@ class Masking:
             self._posing.select(None)
             if editor.view.tool is not ToolName.MASK or is_empty:
                 editor.view.tool = ToolName.SELECT
+            if before is not None:
+                self.mirroring.carry(before, changed)
             editor.apply(label, changed)
 
         def start_over() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -27,23 +28,27 @@ class MirrorIntents:
 
     def __init__(self, editor: EditorState) -> None:
         self._editor = editor
-        self._masks: list[Mask] = []  # of the objects that are
 
     @property
     def is_on(self) -> bool:
         """Whether the current object is; another one need not be."""
         own = self._editor.mask
-        return own is not None and any(mask is own for mask in self._masks)
+        return own is not None and self._has(own)
+
+    def _has(self, mask: Mask | None) -> bool:
+        return mask is not None and any(one() is mask for one in self._editor.tab.mirrored)
 
     def toggle(self) -> None:
-        own, is_on = self._editor.mask, self.is_on
-        self._masks = [mask for mask in self._masks if mask is not own]
+        own, tab, is_on = self._editor.mask, self._editor.tab, self.is_on
+        tab.mirrored = [mask for mask in tab.mirrored if mask() is not own]
         if own is not None and not is_on:
-            self._masks.append(own)
+            tab.mirrored.append(weakref.ref(own))
 
-    def forget(self) -> None:
-        """The document is closed."""
-        self._masks = []
+    def carry(self, before: Document, after: Document) -> None:
+        """Masks of `before` are other ones in `after`: they stay as they are mirrored, or not."""
+        for one, other in zip(before.objects, after.objects, strict=False):
+            if other.mask is not None and self._has(one.mask) and not self._has(other.mask):
+                self._editor.tab.mirrored.append(weakref.ref(other.mask))
 
     @property
     def plane(self) -> MirrorPlane | None:

@@ -18,7 +18,7 @@ from ...canvas.shape import CanvasShape, build_shape, rehearse
 from ...system import clipboard
 from ...system.texts import t
 from ...worker.requests import LIFT, JobError
-from ..tasks import SELECT
+from ..tasks import READ_MASK, SELECT
 from ..view import USUAL_LEVEL, Action, StatusMessage, ToolName
 from .composing import USUAL_SHADOW
 
@@ -75,16 +75,20 @@ class Objects:
             editor.view.tool = ToolName.SELECT
         return restore
 
-    def follow(self, before: Document) -> None:
-        """After a step back or forth: the tools change the object that the step changed."""
+    def follow(self, before: Document, is_forth: bool) -> None:
+        """After a step back or forth: the tools change the object that the step changed.
+
+        Where objects are gone that is the one that they changed, or what is in its place now.
+        """
         editor, now = self._editor, self._editor.document
         if now is None:
             return
-        pairs = enumerate(zip(before.objects, now.objects, strict=False))
-        changed = [k for k, (old, new) in pairs if old is not new]
-        if len(now.objects) != len(before.objects):
-            changed = [min(len(before.objects), len(now.objects))]
-        if changed and editor.current not in changed:
+        changed, gone = _others(now, before), _others(before, now)
+        if len(now.objects) < len(before.objects):
+            editor.current -= sum(k < editor.current for k in gone)
+            if is_forth:  # else what is selected next takes the place of what was selected there
+                editor.current = max(min(editor.current, len(now.objects) - 1), 0)
+        elif changed and editor.current not in changed:
             editor.current = changed[0]
 
     def toggle_visible(self, k: int) -> None:
@@ -151,7 +155,11 @@ class Objects:
         if editor.object.is_locked:
             editor.say_locked(k)
             return
-        for job in (SELECT, LIFT):  # what they would bring is for an object by its number
+        for job in (
+            SELECT,
+            LIFT,
+            READ_MASK,
+        ):  # what they would bring is for an object by its number
             editor.jobs.cancel(job)
         left = edits.remove_object(document, k)
         editor.apply(t("Remove object"), left)
@@ -174,10 +182,10 @@ class Objects:
             is_free = k == editor.current or not document.objects[k].is_locked
             is_there = is_free and document.objects[k].is_visible
             if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
-                return None if k == editor.current or self._is_over_current(k) else k
+                return None if k == editor.current or self.is_over_current(k) else k
         return None
 
-    def _is_over_current(self, k: int) -> bool:
+    def is_over_current(self, k: int) -> bool:
         """Whether object `k` is a copy exactly where the current one is: nobody sees which."""
         editor = self._editor
         other, own = editor.opened.objects[k], editor.object
@@ -299,6 +307,11 @@ class Objects:
             self._put(k, len(below), t("Change the order"))
 
 
+def _others(document: Document, but: Document) -> list[int]:
+    """The objects of one document that are not in the other as they are."""
+    return [k for k, o in enumerate(document.objects) if all(o is not one for one in but.objects)]
+
+
 # An object of one photo that is copied into another: kept in the program, pasted in any tab.
 
 PASTE = "paste object"  # kind of chores
@@ -311,6 +324,7 @@ class Pasting:
     def __init__(self, editor: EditorState, objects: Objects, tabs: Tabs) -> None:
         self._editor, self._objects, self._tabs = editor, objects, tabs
         self._copied: EditObject | None = None
+        self._original: EditObject | None = None  # the same as it was in its own photo
         self._photo: weakref.ref[Photo] | None = None  # it was copied from
         self._picture: bytes | None = b""  # PNG of it in the clipboard; None: not there yet
         self._waiting: list[tuple[Tab, Callable[[], None]]] = []  # asked for while one is pasted
@@ -324,7 +338,7 @@ class Pasting:
         """Remembers the current object, if it is lifted, as it is now; else nothing is copied."""
         from objectmorpher_core.compose.light.lighting import Lighting
 
-        self._copied = self._picture = None
+        self._copied = self._original = self._picture = None
         editor, document = self._editor, self._editor.committed
         if document is None or not editor.is_lifted or editor.current >= len(document.objects):
             return
@@ -333,6 +347,7 @@ class Pasting:
         puppet = editor.derived.shape(document.photo, item).puppet
         light = Lighting(document).around(puppet.posed(None, Placement()))
         self._copied = visitor_edits.departing(document, k, light)
+        self._original = item
         self._photo = weakref.ref(document.photo)
 
     def offered(self, png: bytes) -> None:
@@ -389,7 +404,7 @@ class Pasting:
         if document is None or copied is None or editor.hand.is_busy:
             return
         tab, photo = editor.tab, document.photo
-        if self._photo is not None and self._photo() is photo and self._return(document, copied):
+        if self._return(document):
             return
 
         def build() -> tuple[EditObject, CanvasShape]:
@@ -417,7 +432,7 @@ class Pasting:
             posed = partial(editor.derived.posed, there)
             there = brought_into_sight(there, len(now.objects), posed)
             self._show(there)
-            editor.say(t("{name} is in this photo now · Drag it to its place", name=visitor.name))
+            self._say_there()
 
         self._start(build, accept)
 
@@ -436,14 +451,29 @@ class Pasting:
             self._picture = b""
             self._tabs.go(tab, self.paste)
 
-    def _return(self, document: Document, copied: EditObject) -> bool:
-        """In its own photo it is a copy as of Duplicate; False where the original is gone."""
-        for k, item in enumerate(document.objects):
-            if item.matte is copied.matte and item.lifted is not None:
-                self._show(edits.duplicate(document, k))
-                self._objects.say_copied()
-                return True
-        return False
+    def _return(self, document: Document) -> bool:
+        """In its own photo it is a copy as of Duplicate, as it was when it was copied.
+
+        False in another one, and where the original is gone.
+        """
+        original = self._original
+        if original is None or self._photo is None or self._photo() is not document.photo:
+            return False
+        alike = [k for k, item in enumerate(document.objects) if item.mask is original.mask]
+        if not alike:
+            return False
+        k = alike[0]
+        there = edits.duplicate(document.with_object(k, original), k)
+        self._show(there.with_object(k, document.objects[k]))
+        if any(map(self._objects.is_over_current, alike)):
+            self._objects.say_copied()
+        else:
+            self._say_there()
+        return True
+
+    def _say_there(self) -> None:
+        name = self._editor.chosen.name
+        self._editor.say(t("{name} is in this photo now · Drag it to its place", name=name))
 
     def _show(self, changed: Document) -> None:
         editor = self._editor

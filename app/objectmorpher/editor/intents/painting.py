@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from objectmorpher_core.document.model import Document, EditObject, Matte, Plate
 from ...canvas.layer import CanvasLayer
 from ...system.texts import t
 from ...worker.requests import JobError
+from ..history import CLOCK
 from ..view import PaintWith
 from .composing import Answers, stroke_tint
 
@@ -65,6 +67,7 @@ class _Canvas:
     camera: Camera
     document: Document
     plate: Plate | None
+    drawn: tuple[tuple[EditObject, PosedSplats | None], ...]  # what is seen over it, back to front
 
     def painted(self, laid: _Laid) -> _Painted:
         """It with the stroke; this takes a moment."""
@@ -96,7 +99,6 @@ class _Canvas:
         self, box: tuple[int, int, int, int], aside: tuple[float, float]
     ) -> tuple[F32, np.ndarray]:
         """(h, w, 3) what is seen `aside` of a box, and where (h, w) there is anything."""
-        from objectmorpher_core.compose.paint import look
         from objectmorpher_core.compose.plate.plate import plate_crop
 
         dx, dy = (round(v) for v in aside)
@@ -110,10 +112,28 @@ class _Canvas:
         below = photo[inner[1] : inner[3], inner[0] : inner[2]]
         if self.plate is not None:
             below = plate_crop(photo, self.plate, inner)
-        seen = look(self.splats, self.matte, self.camera, inner)
-        shown = seen.color + (1 - seen.alpha[..., None]) * unit_pixels(below)
+        shown = unit_pixels(below)
+        for item, splats in self.drawn:
+            color, alpha = self._seen(item, splats, inner)
+            shown = color + (1 - alpha[..., None]) * shown
         there[inner[1] - y0 : inner[3] - y0, inner[0] - x0 : inner[2] - x0] = True
         return crop(np.asarray(shown, np.float32), inner, (x0, y0, x1, y1)), there
+
+    def _seen(
+        self, item: EditObject, splats: PosedSplats | None, box: tuple[int, int, int, int]
+    ) -> tuple[F32, F32]:
+        """(h, w, 3) premultiplied and (h, w) alpha of an object in a box, without its light."""
+        from objectmorpher_core.compose.light.lighting import object_texture
+        from objectmorpher_core.raster import tiles
+
+        matte = item.matte
+        assert matte is not None, "what is drawn has a matte"
+        if splats is None or not item.is_moved:
+            alpha = np.minimum(crop(matte.alpha, matte.box, box), 1.0)
+            return alpha[..., None] * crop(matte.foreground, matte.box, box), alpha
+        shown = tiles.prepare(splats, self.camera, self.camera)
+        drawn = tiles.draw(shown, object_texture(matte, item.lifted), box)
+        return drawn.color, drawn.alpha
 
 
 class Painting:
@@ -123,6 +143,7 @@ class Painting:
         self._editor = editor
         self._stroke: _Laid | None = None  # being painted
         self._waiting: list[tuple[int, _Laid]] = []  # on which object; the first is worked on
+        self.newest = 0  # number of the last one, as of the history's steps
         self._aside: tuple[float, float] | None = None  # image px from the brush to its source
         self._answers = Answers(editor)
 
@@ -189,11 +210,12 @@ class Painting:
         if not laid.stroke.coverage[y0:y1, x0:x1].any():
             return
         self._waiting.append((self._editor.current, laid))
+        self.newest = next(CLOCK)
         if len(self._waiting) == 1:
             self._lay()
 
     @property
-    def waiting_label(self) -> str | None:
+    def undo_label(self) -> str | None:
         """Of the last stroke that is not on the object yet; None: there is none."""
         return _label(self._waiting[-1][1]) if self._waiting else None
 
@@ -228,6 +250,8 @@ class Painting:
         return bool(self._waiting)
 
     def _canvas(self, k: int) -> _Canvas | None:
+        from objectmorpher_core.compose.order import stack
+
         editor, document = self._editor, self._editor.committed
         if document is None or k >= len(document.objects):
             return None
@@ -240,7 +264,11 @@ class Painting:
         )
         is_edited = any(each.is_moved for each in document.objects)
         plate = editor.derived.plate(document) if is_edited else None
-        return _Canvas(item, item.matte, shape, splats, document.photo.camera, document, plate)
+        objects, there = document.objects, stack(document, partial(editor.derived.posed, document))
+        drawn = tuple((objects[j], own) for j, own in there.items() if objects[j].is_visible)
+        return _Canvas(
+            item, item.matte, shape, splats, document.photo.camera, document, plate, drawn
+        )
 
     def _lay(self) -> None:
         """The first stroke that waits, on the object as it is now."""
@@ -281,6 +309,7 @@ class Painting:
                 if answer.is_mirrored:
                     editor.say(t("This back is the front mirrored: both are painted"))
         if self._waiting:
+            self.newest = next(CLOCK)
             self._lay()
 
     def painted_layer(self) -> CanvasLayer | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -308,18 +309,17 @@ class Placing:
             self._editor.commit(t("Back to where it was"))
 
     def reset_position(self) -> None:
-        self._reset(t("Reset position"), move=self.home.move, depth=self.home.depth)
+        home = self.home
+        self._reset(t("Reset position"), lambda p: replace(p, move=home.move, depth=home.depth))
 
     def reset_turn(self) -> None:
-        self._reset(t("Reset turn"), turn=(0.0, 0.0, 0.0))
+        self._reset(t("Reset turn"), lambda p: self.turned(p, (0.0, 0.0, 0.0)))
 
     def reset_size(self) -> None:
-        self._reset(t("Reset size"), scale=self.home.scale)
+        self._reset(t("Reset size"), lambda p: self.scaled(p, self.home.scale))
 
-    def _reset(self, label: str, **parts: object) -> None:
+    def _reset(self, label: str, change: Callable[[Placement], Placement]) -> None:
         placement = self.placement
-        if placement is not None:
-            changed = replace(placement, **parts)  # type: ignore[arg-type]
-            if changed != placement:
-                self.move_to(changed)
-                self._editor.commit(label)
+        if placement is not None and (changed := change(placement)) != placement:
+            self.move_to(changed)
+            self._editor.commit(label)

@@ -11,7 +11,7 @@ import numpy as np
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import turn_about, turned_by
 from objectmorpher_core.document import edits, hold_edits
-from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.model import Document, EditObject
 from objectmorpher_core.document.pose import turn_at
 
 from ...canvas.derived import Spot
@@ -83,7 +83,6 @@ class Posing:
     def forget(self) -> None:
         """The document is closed."""
         self._solved = self._restless = None
-        self.mirroring.forget()
 
     @property
     def is_restless(self) -> bool:
@@ -122,6 +121,14 @@ class Posing:
         positions = self.positions()
         inside = np.flatnonzero(((positions >= low) & (positions <= high)).all(1)).tolist()
         self.select(*(self.selected if is_added else ()), *inside)
+
+    def follow(self, before: EditObject | None) -> None:
+        """After a step back or forth: the handles that were selected, by what they are on."""
+        now, there = self._editor.object, {}
+        if before is not None and now is not None and now.lifted is before.lifted:
+            own = {handle.control_point: h for h, handle in enumerate(now.handles)}
+            there = {h: own.get(handle.control_point) for h, handle in enumerate(before.handles)}
+        self.select(*(there.get(h) for h in self._selected))
 
     def forget_lost(self) -> None:
         """Deselects what the document does not have any more."""

@@ -180,6 +180,7 @@ class Selection:
             return
         if loses_work(editor.history.document, document, question.k):
             return
+        self._masking.mirroring.carry(editor.history.document, document)
         editor.history.amend(document, is_repeatable=False)
         if question.combine in (Combine.ANEW, Combine.REFINED):
             self._told = editor.mask, found.confidence
@@ -221,6 +222,8 @@ class Selection:
         if asked is not None and self.pending is not None and combine is Combine.REFINED:
             before = asked.before  # it is in this one
         question = Question(prompt, label, editor.current, combine, before)
+        if asked is not None and asked is self._tasks.lifts and asked.k == question.k:
+            self._tasks.lifts = question  # this one is answered instead
         if not self._candidates.take(question):
             self._tasks.segment(question, self.take)
 
