@@ -162,7 +162,7 @@ def _read(data: bytes, most: int) -> Picture:
         allowed = f"{most // 10**6} megapixels" if most >= 10**6 else f"{most:,} px"
         raise ImageError(f"the image is {image.width} x {image.height} px, more than {allowed}")
     try:
-        return _read_16_bit(data, image, most) or _read_8_bit(image)
+        return _read_16_bit(data, image, most) or _read_8_bit(data, image)
     except ImageError:
         raise
     except MemoryError as error:
@@ -189,21 +189,21 @@ def _read_guest(kind: str, data: bytes, most: int) -> Picture:
 
 def _read_16_bit(data: bytes, image: Image.Image | None, most: int) -> Picture | None:
     """The picture of a file with 16 bits a channel; None where it has fewer."""
-    if data.startswith(png.SIGNATURE):
+    if data.startswith(png.SIGNATURE) and image is not None:
         if png.bit_depth(data) != 16:
             return None
-        samples, turn = png.read_16_bit(data), None
-    elif data[:4] in tiff.MARKS:
-        found = tiff.read_16_bit(data, most)
-        if found is None:
-            return None
-        samples, turn = found
-    else:
+        samples, block = png.read_16_bit(data)
+        return _picture(samples, block, image.info.get("icc_profile"), turn=None)
+    found = tiff.read_16_bit(data, most) if data[:4] in tiff.MARKS else None
+    if found is None:
         return None
-    return _picture(samples, *_about(image), turn)
+    samples, turn, icc = found
+    if image is None:
+        return _picture(samples, tiff.described_raw(data), icc, turn)
+    return _picture(samples, tiff.described(image), image.info.get("icc_profile"), turn)
 
 
-def _read_8_bit(image: Image.Image | None) -> Picture:
+def _read_8_bit(data: bytes, image: Image.Image | None) -> Picture:
     """The picture of any file that Pillow decodes to 8 bits a channel."""
     if image is None:
         raise ImageError("this kind of TIFF file cannot be read")
@@ -211,13 +211,18 @@ def _read_8_bit(image: Image.Image | None) -> Picture:
         raise ImageError("only images of 8 or 16 whole-number bits a channel can be read")
     turn = 1 if image.format == "TIFF" else None  # Pillow turns TIFF files itself
     if image.mode in ("CMYK", "LAB"):
-        picture = _picture(np.asarray(_through_profile(image)), *_about(image), turn)
-        return replace(picture, icc=None)
+        samples = np.asarray(_through_profile(image))
+        return _picture(samples, _exif_block(image), None, turn)
+    clear = image.info.get("transparency")
+    if image.mode == "L" and image.format == "PNG" and isinstance(clear, int):
+        top = (1 << png.bit_depth(data)) - 1  # Pillow looks for the value among scaled samples
+        image.info["transparency"] = (clear & top) * 255 // top
     has_alpha = image.mode in ("LA", "La", "PA", "RGBA", "RGBa") or "transparency" in image.info
     is_grey = image.mode in ("1", "L", "LA", "La")
     mode = ("LA" if has_alpha else "L") if is_grey else ("RGBA" if has_alpha else "RGB")
     samples = np.asarray(image.convert(mode))
-    return _picture(samples.reshape(*samples.shape[:2], -1), *_about(image), turn)
+    block, icc = _exif_block(image), image.info.get("icc_profile")
+    return _picture(samples.reshape(*samples.shape[:2], -1), block, icc, turn)
 
 
 def _through_profile(image: Image.Image) -> Image.Image:
@@ -253,21 +258,14 @@ def _picture(
         pixels=samples[..., :3] if channels > 2 else np.repeat(samples[..., :1], 3, axis=2),
         alpha=samples[..., -1] if channels in (2, 4) else None,
         is_grey=channels < 3,
-        icc=icc,
+        icc=icc or None,
         exif=exif.upright(block) if block else None,
         focal_35mm=exif.focal_35mm(block) if block else None,
     )
 
 
-def _about(image: Image.Image | None) -> tuple[bytes | None, bytes | None]:
-    """EXIF block and colour profile of an opened file."""
-    if image is None:
-        return None, None
-    return _exif_block(image), image.info.get("icc_profile") or None
-
-
 def _exif_block(image: Image.Image) -> bytes | None:
-    """The EXIF block without prefix; None where there is none."""
+    """The EXIF block without prefix of an image that is decoded; None where there is none."""
     if image.format == "TIFF":
         return tiff.described(image)
     block = image.info.get("exif")

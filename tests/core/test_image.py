@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -173,6 +174,64 @@ def test_profile_and_exif_are_kept(ending, chelsea):
     exif.load(back.exif)
     assert exif[0x010F] == "A camera"
     assert exif.get_ifd(0x8769)[0x927C] == b"a maker's note"
+
+
+def chunks_of(data: bytes) -> list[bytes]:
+    """A PNG's chunks, whole."""
+    found, at = [], len(png.SIGNATURE)
+    while at < len(data):
+        end = at + 12 + struct.unpack_from(">I", data, at)[0]
+        found.append(data[at:end])
+        at = end
+    return found
+
+
+def chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+@over("kind", ["behind the pixels", "grey alpha", "further channel"])
+def test_16_bit_files_are_described_wherever_that_stands(kind, chelsea):
+    """Behind a PNG's pixels, and in a TIFF of channels that Pillow cannot read."""
+    pixels = deep(chelsea[:20, :30])
+    block = exif_block(1).tobytes().removeprefix(b"Exif\0\0")
+    if kind == "behind the pixels":
+        *before, end = chunks_of(encode_picture(Picture(pixels, icc=SRGB), "png"))
+        data = b"".join([png.SIGNATURE, *before, chunk(b"eXIf", block), end])
+    elif kind == "grey alpha":
+        grey = pictures(pixels)["grey alpha"]
+        data = encode_picture(replace(grey, icc=GREY_PROFILE, exif=block), "tif")
+    else:
+        data = tiff_bytes(
+            np.dstack([pixels, pixels[..., :2]]), photometric="rgb", iccprofile=SRGB,
+            extrasamples=["unassalpha", "unspecified"],
+            extratags=[(271, 2, None, "A camera", True)],  # tifffile writes no directory of EXIF
+        )  # fmt: skip
+    back = read_picture(data)
+    assert back.icc == (GREY_PROFILE if kind == "grey alpha" else SRGB)
+    assert back.focal_35mm == (None if kind == "further channel" else 35.0)
+    exif = Image.Exif()
+    exif.load(back.exif)
+    assert exif[0x010F] == "A camera"
+
+
+@over("bits", [1, 2, 4, 8, 16])
+def test_one_value_of_a_grey_png_may_be_clear(bits):
+    most = (1 << bits) - 1
+    values = np.arange(most + 1) if bits <= 8 else np.arange(0, most + 1, 257)
+    for clear in (0, 1, most):
+        values[-2:] = clear, most - clear  # of 16 bits, too, one that is just beside another
+        stored = sum(int(v) << bits * k for k, v in enumerate(values[::-1]))
+        width = bits * len(values)
+        row = b"\0" + (stored << -width % 8).to_bytes(-(-width // 8), "big")
+        head = struct.pack(">IIBBBBB", len(values), 1, bits, 0, 0, 0, 0)
+        parts = {b"IHDR": head, b"tRNS": struct.pack(">H", clear), b"IDAT": zlib.compress(row)}
+        data = b"".join(chunk(*part) for part in [*parts.items(), (b"IEND", b"")])
+        picture = read_picture(png.SIGNATURE + data)
+        assert picture.is_grey and picture.alpha is not None
+        np.testing.assert_array_equal(picture.alpha[0] == 0, values == clear)
+        top = np.iinfo(picture.pixels.dtype).max
+        np.testing.assert_array_equal(picture.pixels[0, :, 0], values * top // most)
 
 
 def test_a_grey_profile_never_reaches_a_colour_file(chelsea):
