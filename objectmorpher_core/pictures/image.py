@@ -76,9 +76,8 @@ def pil_of(picture: Picture) -> Image.Image:
 
     Of 16 bits a channel Pillow keeps only grey without alpha; other pictures are rounded to 8.
     """
-    colours = picture.pixels
-    if picture.is_grey:
-        colours = cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY)
+    picture = _without_false_grey(picture)
+    colours = _grey(picture.pixels) if picture.is_grey else picture.pixels
     if not picture.is_grey or picture.alpha is not None:
         colours = to_u8(colours)
     if picture.alpha is not None:
@@ -95,6 +94,7 @@ READ_ENDINGS = READABLE  # of what counts as a picture in a folder of pictures
 MASK_THRESHOLD = 127  # of 255; above it a mask's pixel belongs to the object
 WEBP_MAX_SIDE = 16383  # px
 JPEG_MAX_SIDE = 65535  # px
+JPEG_EXIF = 65533  # bytes of a segment, without its length
 AVIF_MAX_SIDE = 65535  # px
 AVIF_SPEED = 8  # of 10; 6 takes three times as long for 3 % less
 REASON = 200  # characters of what a decoder says
@@ -296,8 +296,7 @@ def encode_picture(
     ending = "." + ending.lower().removeprefix(".")
     if ending not in ENDINGS:
         raise ImageError(f"pictures cannot be written as {ending}, only as {', '.join(ENDINGS)}")
-    if picture.is_grey and _has_colour(picture.pixels):
-        picture = replace(picture, is_grey=False)
+    picture = _without_false_grey(picture)
     try:
         if ending in (".jpg", ".jpeg"):
             return _encode_jpeg(picture, quality)
@@ -339,12 +338,14 @@ class _Channels:
         return np.concatenate([colours, picture.alpha[rows][..., None]], axis=2)
 
 
-def _has_colour(pixels: Pixels) -> bool:
-    """Whether any pixel is of another colour than a rounded grey."""
-    least = COLOURED * np.iinfo(pixels.dtype).max / 255
-    red, green, blue = (pixels[..., k] for k in range(3))
+def _without_false_grey(picture: Picture) -> Picture:
+    """The picture, no longer grey where a pixel is of another colour than a rounded grey."""
+    least = COLOURED * np.iinfo(picture.pixels.dtype).max / 255
+    red, green, blue = (picture.pixels[..., k] for k in range(3))
     pairs = (red, green), (green, blue), (blue, red)
-    return any(int(cv2.absdiff(a, b).max(initial=0)) > least for a, b in pairs)
+    if picture.is_grey and any(int(cv2.absdiff(a, b).max(initial=0)) > least for a, b in pairs):
+        return replace(picture, is_grey=False)
+    return picture
 
 
 def _pillow(samples: np.ndarray) -> Image.Image:
@@ -368,9 +369,24 @@ def _encode_jpeg(picture: Picture, quality: int) -> bytes:
     image = _pillow(_grey(pixels) if picture.is_grey else pixels)
     out = io.BytesIO()
     profile = _profile_for(picture, 1 if picture.is_grey else 3)
-    block = exif.PREFIX + picture.exif if picture.exif else b""
+    block = _exif_for_jpeg(exif.PREFIX + picture.exif) if picture.exif else b""
     image.save(out, "JPEG", quality=quality, subsampling=0, icc_profile=profile, exif=block)
     return out.getvalue()
+
+
+def _exif_for_jpeg(block: bytes) -> bytes:
+    """The block; without the maker's note, or empty, where there is no room for all of it."""
+    from PIL import Image
+
+    if len(block) > JPEG_EXIF:
+        found = Image.Exif()
+        try:
+            found.load(block)
+            found.get_ifd(exif.EXIF_IFD).pop(exif.MAKER_NOTE, None)
+            block = found.tobytes()
+        except Exception:  # Pillow raises whatever a broken block makes it stumble over
+            return b""
+    return block if len(block) <= JPEG_EXIF else b""
 
 
 def _encode_webp(picture: Picture, quality: int) -> bytes:

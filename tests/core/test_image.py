@@ -19,6 +19,7 @@ from objectmorpher_core.pictures.image import (
     encode_mask,
     encode_picture,
     encode_pil,
+    pil_of,
     read_mask,
     read_picture,
     resized,
@@ -101,6 +102,9 @@ def test_a_grey_photo_that_something_coloured_came_into_has_colour(ending, is_de
     back = read_picture(encode_picture(Picture(painted, is_grey=True), ending))
     np.testing.assert_array_equal(back.pixels, painted)
     assert not back.is_grey
+    shown = pil_of(Picture(painted, is_grey=True))
+    np.testing.assert_array_equal(np.asarray(shown), to_u8(painted))
+    assert pil_of(Picture(pixels, is_grey=True)).mode == ("I;16" if pixels.itemsize > 1 else "L")
 
 
 @pytest.mark.parametrize("ending", DEEP)
@@ -174,6 +178,24 @@ def test_profile_and_exif_are_kept(ending, chelsea):
     exif.load(back.exif)
     assert exif[0x010F] == "A camera"
     assert exif.get_ifd(0x8769)[0x927C] == b"a maker's note"
+
+
+@over("note", [60_000, 100_000])
+@over("more", [0, 80_000])
+def test_a_jpeg_keeps_as_much_exif_as_it_has_room_for(note, more, chelsea):
+    """64 kB: without a long maker's note, and without any where the rest is too long, too."""
+    exif = exif_block(1)
+    exif.get_ifd(0x8769)[0x927C] = bytes(note)
+    exif[0x013B] = "x" * more
+    picture = Picture(chelsea, exif=exif.tobytes().removeprefix(b"Exif\0\0"))
+    back = read_picture(encode_picture(picture, ".jpg"))
+    assert back.focal_35mm == (None if more else 35.0)
+    if not more:
+        kept = Image.Exif()
+        kept.load(back.exif)
+        assert kept[0x010F] == "A camera"
+        assert (0x927C in kept.get_ifd(0x8769)) == (note < 65_000)
+    assert read_picture(encode_picture(picture, ".png")).focal_35mm == 35.0
 
 
 def chunks_of(data: bytes) -> list[bytes]:
