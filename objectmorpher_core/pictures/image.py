@@ -33,8 +33,13 @@ AS_TIFF = ("CMYK", "LAB")
 WITH_ALPHA = {"RGBa": "RGBA", "La": "LA", "PA": "RGBA"}  # what they become first
 
 
-def encode_array(array: np.ndarray) -> bytes:
-    """The PNG file of pixels (H, W) or (H, W, 1..4), u8 or u16, RGB. Raises ImageError."""
+def encode_array(
+    array: np.ndarray, icc: bytes | None = None, described: bytes | None = None
+) -> bytes:
+    """The PNG file of pixels (H, W) or (H, W, 1..4), u8 or u16, RGB, with profile and EXIF.
+
+    Raises ImageError.
+    """
     if array.dtype not in (np.uint8, np.uint16):
         raise ImageError(
             f"a photo is an array of uint8 or uint16, not of {array.dtype};"
@@ -46,21 +51,27 @@ def encode_array(array: np.ndarray) -> bytes:
     channels = samples.shape[2]
     pixels = samples[..., :3] if channels > 2 else np.repeat(samples[..., :1], 3, axis=2)
     alpha = samples[..., -1] if channels in (2, 4) else None
-    return encode_picture(Picture(pixels, alpha, is_grey=channels < 3), ".png")
+    return encode_picture(Picture(pixels, alpha, channels < 3, icc, described), ".png")
 
 
 def encode_pil(image: Image.Image) -> bytes:
     """A file of Pillow's image, without loss, with its profile and EXIF. Raises ImageError."""
+    image.load()  # first: Pillow turns a TIFF file then, and finds what is behind a PNG's pixels
+    if image.format == "TIFF":
+        block = tiff.described(image)  # without its size, which is that before the turn
+    else:
+        block = image.getexif().tobytes().removeprefix(exif.PREFIX) if image.getexif() else None
+    icc = image.info.get("icc_profile")
     if image.mode.startswith("I;16"):
-        return encode_array(np.asarray(image).astype(np.uint16))
+        return encode_array(np.asarray(image).astype(np.uint16), icc, block)
     if image.mode in ("I", "F"):
         raise ImageError(f"an image of mode {image.mode} is no photo; convert it to RGB")
     kind = "TIFF" if image.mode in AS_TIFF else "PNG"
     if image.mode not in (*AS_PNG, *AS_TIFF):
         image = image.convert(WITH_ALPHA.get(image.mode, "RGB"))
-    more = {"exif": found} if (found := image.getexif()) else {}
+    more = {"exif": block} if block else {}
     out = io.BytesIO()
-    image.save(out, kind, icc_profile=image.info.get("icc_profile"), **more)
+    image.save(out, kind, icc_profile=icc, **more)
     return out.getvalue()
 
 

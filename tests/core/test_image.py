@@ -471,6 +471,25 @@ def test_every_mode_of_pillow_becomes_a_picture(mode: str, chelsea: np.ndarray) 
     assert read_picture(encode_pil(image)).pixels.shape == (20, 30, 3)
 
 
+@over("mode", ["L", "RGB", "CMYK", "I;16"])
+@over("kind", ["JPEG", "TIFF", "PNG", "WEBP"])
+@over("orientation", [1, 6])
+def test_an_image_of_pillow_is_the_photo_of_its_file(mode, kind, orientation, chelsea) -> None:
+    if {"CMYK": "PNG WEBP", "I;16": "JPEG WEBP"}.get(mode, "").count(kind):
+        return  # no such files
+    image = Image.fromarray(chelsea[:20, :30])
+    deep_grey = Image.fromarray(deep(chelsea[:20, :30, 0]))
+    image = deep_grey if mode == "I;16" else image.convert(mode)
+    icc = {"L": GREY_PROFILE, "I;16": GREY_PROFILE, "RGB": SRGB}.get(mode)
+    exif = Image.Exif()
+    exif.load(exif_block(orientation).tobytes())  # what TIFF files take it from
+    data = pil_bytes(image, kind, exif=exif, icc_profile=icc)
+    direct, opened = read_picture(data), read_picture(encode_pil(Image.open(io.BytesIO(data))))
+    assert_same(opened, direct)
+    assert opened.icc == direct.icc
+    assert opened.focal_35mm == direct.focal_35mm == 35.0
+
+
 def test_a_tiff_channel_that_is_no_alpha_is_left_out_at_any_depth(chelsea: np.ndarray) -> None:
     samples = np.dstack([chelsea[:20, :30], chelsea[:20, :30, :1]])
     for kind in (np.uint8, np.uint16):
