@@ -7,6 +7,7 @@ byte for byte; only 16-bit pixels that go into a format of 8 bits (`formats.py`)
 from __future__ import annotations
 
 import io
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -94,7 +95,8 @@ def pil_of(picture: Picture) -> Image.Image:
     if picture.alpha is not None:
         colours = np.dstack([colours, to_u8(picture.alpha)])
     image = _pillow(colours)
-    known = {"icc_profile": picture.icc, "exif": picture.exif}
+    icc = profile_for(picture.icc, len(image.getbands()))
+    known = {"icc_profile": icc, "exif": picture.exif}
     image.info.update({key: value for key, value in known.items() if value})
     return image
 
@@ -319,7 +321,7 @@ def encode_picture(
             return _encode_jxl(picture, webp_quality)
         codec = png if ending == ".png" else tiff
         samples = _Channels(picture)
-        return codec.encode(samples, _profile_for(picture, samples.shape[2]), picture.exif)
+        return codec.encode(samples, profile_for(picture.icc, samples.shape[2]), picture.exif)
     except ImageError:
         raise
     except (OSError, ValueError, MemoryError, cv2.error) as error:
@@ -379,7 +381,7 @@ def _encode_jpeg(picture: Picture, quality: int) -> bytes:
     pixels = to_u8(picture.pixels)
     image = _pillow(_grey(pixels) if picture.is_grey else pixels)
     out = io.BytesIO()
-    profile = _profile_for(picture, 1 if picture.is_grey else 3)
+    profile = profile_for(picture.icc, 1 if picture.is_grey else 3)
     block = _exif_for_jpeg(exif.PREFIX + picture.exif) if picture.exif else b""
     image.save(out, "JPEG", quality=quality, subsampling=0, icc_profile=profile, exif=block)
     return out.getvalue()
@@ -408,7 +410,7 @@ def _encode_webp(picture: Picture, quality: int) -> bytes:
     how = {"lossless": True} if quality >= LOSSLESS else {"quality": quality}
     _pillow(_colours_and_alpha(picture)).save(
         out, "WEBP", **how, exact=True,  # exact: colours under transparency stay
-        icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
+        icc_profile=profile_for(picture.icc, 3) or b"", exif=picture.exif or b"",
     )  # fmt: skip
     return out.getvalue()
 
@@ -420,7 +422,7 @@ def _encode_avif(picture: Picture, quality: int) -> bytes:
     out = io.BytesIO()
     _pillow(_colours_and_alpha(picture)).save(
         out, "AVIF", quality=quality, subsampling="4:4:4", speed=AVIF_SPEED,
-        icc_profile=_profile_for(picture, 3) or b"", exif=_exif_for_avif(picture.exif),
+        icc_profile=profile_for(picture.icc, 3) or b"", exif=_exif_for_avif(picture.exif),
     )  # fmt: skip
     return out.getvalue()
 
@@ -442,7 +444,7 @@ def _exif_for_avif(block: bytes | None) -> bytes:
 def _encode_jxl(picture: Picture, quality: int) -> bytes:
     has_pair = picture.is_grey and picture.alpha is not None  # which the library does not take
     samples = _colours_and_alpha(picture) if has_pair else to_u8(_Channels(picture)[:])
-    icc = _profile_for(picture, samples.shape[2])
+    icc = profile_for(picture.icc, samples.shape[2])
     try:
         return guests.encode_jxl(samples, icc, picture.exif, quality)
     except (guests.GuestError, RuntimeError) as error:
@@ -455,10 +457,46 @@ def _colours_and_alpha(picture: Picture) -> RGB:
     return pixels if picture.alpha is None else np.dstack([pixels, to_u8(picture.alpha)])
 
 
-def _profile_for(picture: Picture, channels: int) -> bytes | None:
-    """The ICC profile, unless it is one for another number of colours than the file will hold."""
-    space = b"GRAY" if channels < 3 else b"RGB "
-    return picture.icc if picture.icc is not None and picture.icc[16:20] == space else None
+def profile_for(icc: bytes | None, channels: int) -> bytes | None:
+    """The ICC profile of a file of 1 to 4 channels, of which 3 have colours.
+
+    A grey one becomes one of colours with the same tones, so that all pixels stay as they are;
+    None for a profile of colours in a grey file, and for what cannot be read.
+    """
+    space, wanted = (icc or b"")[16:20], b"GRAY" if channels < 3 else b"RGB "
+    if space == wanted:
+        return icc
+    return _with_colours(icc) if icc and (space, wanted) == (b"GRAY", b"RGB ") else None
+
+
+def _with_colours(grey: bytes) -> bytes | None:
+    """The profile of sRGB with the tone curve, the name and the date of a grey one."""
+    from PIL import ImageCms
+
+    if grey[20:24] != b"XYZ ":  # its curve would be one of lightness
+        return None
+    try:
+        curve = _tags(grey)[b"kTRC"]
+        name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(grey))).strip()
+    except (KeyError, struct.error, OSError, ImageCms.PyCMSError):
+        return None
+    said = name.encode("utf-16-be")
+    own = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    tags = _tags(own) | dict.fromkeys((b"rTRC", b"gTRC", b"bTRC"), curve)
+    tags[b"desc"] = struct.pack(">4s3I4s2I", b"mluc", 0, 1, 12, b"enUS", len(said), 28) + said
+    at, table, body = 132 + 12 * len(tags), [struct.pack(">I", len(tags))], []
+    for tag, data in tags.items():
+        table.append(struct.pack(">4s2I", tag, at, len(data)))
+        body.append(data + bytes(-len(data) % 4))
+        at += len(body[-1])
+    return b"".join([struct.pack(">I", at), own[4:24], grey[24:36], own[36:128], *table, *body])
+
+
+def _tags(icc: bytes) -> dict[bytes, bytes]:
+    """An ICC profile's data by their signatures. Raises struct.error."""
+    count = struct.unpack_from(">I", icc, 128)[0]
+    listed = [struct.unpack_from(">4s2I", icc, 132 + 12 * k) for k in range(count)]
+    return {tag: icc[at : at + size] for tag, at, size in listed}
 
 
 def to_u8(pixels: np.ndarray) -> RGB:

@@ -256,11 +256,57 @@ def test_one_value_of_a_grey_png_may_be_clear(bits):
         np.testing.assert_array_equal(picture.pixels[0, :, 0], values * top // most)
 
 
-def test_a_grey_profile_never_reaches_a_colour_file(chelsea):
+def grey_profile(gamma: float) -> bytes:
+    """An ICC profile of greys, as Photoshop's "Gray Gamma"."""
+    white = struct.pack(">4s4x3i", b"XYZ ", 63190, 65536, 54061)
+    name = "Grey".encode("utf-16-be")
+    tags = {
+        b"desc": struct.pack(">4s3I4s2I", b"mluc", 0, 1, 12, b"enUS", len(name), 28) + name,
+        b"wtpt": white,
+        b"kTRC": struct.pack(">4s4xIHxx", b"curv", 1, round(gamma * 256)),
+    }
+    table, body, at = struct.pack(">I", len(tags)), b"", 132 + 12 * len(tags)
+    for tag, data in tags.items():
+        table += struct.pack(">4s2I", tag, at + len(body), len(data))
+        body += data + bytes(-len(data) % 4)
+    head = struct.pack(">I4xI4s4s4s", at + len(body), 0x0420_0000, b"mntr", b"GRAY", b"XYZ ")
+    head += struct.pack(">6H4s28x", 2026, 11, 30, 0, 0, 0, b"acsp") + white[8:]
+    return head + bytes(128 - len(head)) + table + body
+
+
+def as_srgb(image: Image.Image) -> np.ndarray:
+    own = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"]))
+    found = ImageCms.profileToProfile(image, own, ImageCms.createProfile("sRGB"), outputMode="RGB")
+    return np.asarray(found).astype(int)
+
+
+@over("gamma", [1.0, 2.2, 1.8])
+@over("ending", [".webp", ".avif", ".png", ".tif", ".jpg"])
+def test_a_grey_photos_tones_are_kept_where_a_file_has_colours(gamma, ending):
+    """In a format without grey, and where something coloured came into the photo."""
+    pixels = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2).repeat(8, axis=0)
+    picture = Picture(pixels, is_grey=True, icc=grey_profile(gamma))
+    grey = Image.open(io.BytesIO(encode_picture(picture, ".png")))
+    assert grey.mode == "L" and grey.info["icc_profile"] == picture.icc
+    colours = Image.open(io.BytesIO(encode_picture(replace(picture, is_grey=False), ending)))
+    assert colours.mode == "RGB"
+    light = (pixels / 255) ** gamma
+    truth = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    slack = 3 * 13 if ending == ".avif" else 1  # lossy, and the dark tones of gamma 1 are steep
+    assert np.abs(as_srgb(colours) - 255 * truth).max() <= slack
+    assert (
+        colours.info["icc_profile"] == pil_of(replace(picture, is_grey=False)).info["icc_profile"]
+    )
+    if slack == 1:
+        np.testing.assert_array_equal(np.asarray(colours), pixels)
+
+
+def test_a_profile_that_does_not_fit_is_left_out(chelsea):
     grey = np.repeat(chelsea[..., :1], 3, axis=2)
-    picture = Picture(grey, is_grey=True, icc=GREY_PROFILE)
+    picture = Picture(grey, is_grey=True, icc=GREY_PROFILE)  # which has no tones
     assert read_picture(encode_picture(picture, "png")).icc == GREY_PROFILE
     assert read_picture(encode_picture(picture, "webp")).icc is None
+    assert read_picture(encode_picture(replace(picture, icc=SRGB), "png")).icc is None
 
 
 @over("orientation", range(1, 9))
