@@ -83,7 +83,7 @@ class NotServed(Exception):
     """The server does not do that, and is there all the same; one sentence."""
 
 
-class TooLarge(Exception):
+class TooMuch(Exception):
     """The server takes smaller requests only, and is there all the same; one sentence."""
 
 

@@ -13,7 +13,7 @@ from objectmorpher_core.base.limits import ANSWER_BYTES as MOST_ANSWER
 from objectmorpher_core.base.limits import ANSWER_LINE as MOST_LINE
 from objectmorpher_core.base.progress import Progress
 
-from .address import PROTOCOL, NotServed, ServedError, Server, ServerLost, TooLarge
+from .address import PROTOCOL, NotServed, ServedError, Server, ServerLost, TooMuch
 from .fitting import fits, is_sound
 from .message import MessageError, WireMessage, decode, encode
 from .table import table, types
@@ -41,7 +41,7 @@ def hello(server: Server) -> dict[str, Any]:
 def call(server: Server, name: str, arguments: tuple[Any, ...], progress: Progress) -> Any:
     """The answer of the job function `name`.
 
-    Raises ServerLost where the server gave none, NotServed where it never will, TooLarge where it
+    Raises ServerLost where the server gave none, NotServed where it never will, TooMuch where it
     would to less, ServedError where the job failed, and Cancelled out of `progress`, which ends
     the job over there, too.
     """
@@ -189,12 +189,12 @@ def _json(response: http.client.HTTPResponse) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _refusal(server: Server, status: int, told: dict[str, Any]) -> ServerLost | TooLarge:
+def _refusal(server: Server, status: int, told: dict[str, Any]) -> ServerLost | TooMuch:
     if status == 401:
         return ServerLost(f"{server.address} does not accept the token")
     reason = told.get("error")
     sentence = f"{server.address} refused: {_text(reason) if reason else f'HTTP {status}'}"
-    return TooLarge(sentence) if status == 413 else ServerLost(sentence)
+    return TooMuch(sentence) if status == 413 else ServerLost(sentence)
 
 
 def _text(value: Any) -> str:

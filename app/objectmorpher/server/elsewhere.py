@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 AWAY = 60.0  # s that a lost server is left alone
 LOST, NOT_SERVED = "ServerLost", "NotServed"  # names of JobErrors: the job is to be done here
-TOO_LARGE = "TooLarge"  # so is this one, and the next may go there again
+TOO_LARGE = "TooMuch"  # so is this one, and the next may go there again
 
 
 @dataclass(frozen=True)

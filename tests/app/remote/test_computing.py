@@ -26,7 +26,7 @@ from objectmorpher.server.address import (
     Server,
     ServerLost,
     TokenError,
-    TooLarge,
+    TooMuch,
     fingerprint,
     make_token,
     read_token,
@@ -109,7 +109,7 @@ def test_what_is_too_large_for_a_server_does_not_lose_it() -> None:
     server, said = Server(Address("127.0.0.1", 1), TOKEN), []
     elsewhere = Elsewhere(lambda: server, lambda _, why: said.append(why))
     function = job_functions.fill_variants
-    assert elsewhere.takes_back(function, TooLarge.__name__, "it takes less")
+    assert elsewhere.takes_back(function, TooMuch.__name__, "it takes less")
     assert not elsewhere.is_away(server) and said == []
     assert isinstance(elsewhere.placed(function), Remote), "the next may go there"
     assert elsewhere.takes_back(function, ServerLost.__name__, "it is gone")
