@@ -11,6 +11,7 @@ import struct
 ORIENTATION = 0x0112
 EXIF_IFD = 0x8769
 FOCAL_LENGTH_35MM = 0xA405
+MAKER_NOTE = 0x927C
 SIZES = ((0x0100, 0x0101), (0xA002, 0xA003))  # width and height: of the file, and its EXIF's own
 ON_ITS_SIDE = 5  # from this orientation on rows are columns
 THUMBNAIL_OFFSET, THUMBNAIL_LENGTH = 0x0201, 0x0202

@@ -7,6 +7,7 @@ byte for byte; only 16-bit pixels that go into a format of 8 bits (`formats.py`)
 from __future__ import annotations
 
 import io
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -33,8 +34,13 @@ AS_TIFF = ("CMYK", "LAB")
 WITH_ALPHA = {"RGBa": "RGBA", "La": "LA", "PA": "RGBA"}  # what they become first
 
 
-def encode_array(array: np.ndarray) -> bytes:
-    """The PNG file of pixels (H, W) or (H, W, 1..4), u8 or u16, RGB. Raises ImageError."""
+def encode_array(
+    array: np.ndarray, icc: bytes | None = None, described: bytes | None = None
+) -> bytes:
+    """The PNG file of pixels (H, W) or (H, W, 1..4), u8 or u16, RGB, with profile and EXIF.
+
+    Raises ImageError.
+    """
     if array.dtype not in (np.uint8, np.uint16):
         raise ImageError(
             f"a photo is an array of uint8 or uint16, not of {array.dtype};"
@@ -46,21 +52,27 @@ def encode_array(array: np.ndarray) -> bytes:
     channels = samples.shape[2]
     pixels = samples[..., :3] if channels > 2 else np.repeat(samples[..., :1], 3, axis=2)
     alpha = samples[..., -1] if channels in (2, 4) else None
-    return encode_picture(Picture(pixels, alpha, is_grey=channels < 3), ".png")
+    return encode_picture(Picture(pixels, alpha, channels < 3, icc, described), ".png")
 
 
 def encode_pil(image: Image.Image) -> bytes:
     """A file of Pillow's image, without loss, with its profile and EXIF. Raises ImageError."""
+    image.load()  # first: Pillow turns a TIFF file then, and finds what is behind a PNG's pixels
+    if image.format == "TIFF":
+        block = tiff.described(image)  # without its size, which is that before the turn
+    else:
+        block = image.getexif().tobytes().removeprefix(exif.PREFIX) if image.getexif() else None
+    icc = image.info.get("icc_profile")
     if image.mode.startswith("I;16"):
-        return encode_array(np.asarray(image).astype(np.uint16))
+        return encode_array(np.asarray(image).astype(np.uint16), icc, block)
     if image.mode in ("I", "F"):
         raise ImageError(f"an image of mode {image.mode} is no photo; convert it to RGB")
     kind = "TIFF" if image.mode in AS_TIFF else "PNG"
     if image.mode not in (*AS_PNG, *AS_TIFF):
         image = image.convert(WITH_ALPHA.get(image.mode, "RGB"))
-    more = {"exif": found} if (found := image.getexif()) else {}
+    more = {"exif": block} if block else {}
     out = io.BytesIO()
-    image.save(out, kind, icc_profile=image.info.get("icc_profile"), **more)
+    image.save(out, kind, icc_profile=icc, **more)
     return out.getvalue()
 
 
@@ -76,15 +88,15 @@ def pil_of(picture: Picture) -> Image.Image:
 
     Of 16 bits a channel Pillow keeps only grey without alpha; other pictures are rounded to 8.
     """
-    colours = picture.pixels
-    if picture.is_grey:
-        colours = cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY)
+    picture = _without_false_grey(picture)
+    colours = _grey(picture.pixels) if picture.is_grey else picture.pixels
     if not picture.is_grey or picture.alpha is not None:
         colours = to_u8(colours)
     if picture.alpha is not None:
         colours = np.dstack([colours, to_u8(picture.alpha)])
     image = _pillow(colours)
-    known = {"icc_profile": picture.icc, "exif": picture.exif}
+    icc = profile_for(picture.icc, len(image.getbands()))
+    known = {"icc_profile": icc, "exif": picture.exif}
     image.info.update({key: value for key, value in known.items() if value})
     return image
 
@@ -95,6 +107,7 @@ READ_ENDINGS = READABLE  # of what counts as a picture in a folder of pictures
 MASK_THRESHOLD = 127  # of 255; above it a mask's pixel belongs to the object
 WEBP_MAX_SIDE = 16383  # px
 JPEG_MAX_SIDE = 65535  # px
+JPEG_EXIF = 65533  # bytes of a segment, without its length
 AVIF_MAX_SIDE = 65535  # px
 AVIF_SPEED = 8  # of 10; 6 takes three times as long for 3 % less
 REASON = 200  # characters of what a decoder says
@@ -162,7 +175,7 @@ def _read(data: bytes, most: int) -> Picture:
         allowed = f"{most // 10**6} megapixels" if most >= 10**6 else f"{most:,} px"
         raise ImageError(f"the image is {image.width} x {image.height} px, more than {allowed}")
     try:
-        return _read_16_bit(data, image, most) or _read_8_bit(image)
+        return _read_16_bit(data, image, most) or _read_8_bit(data, image)
     except ImageError:
         raise
     except MemoryError as error:
@@ -189,21 +202,21 @@ def _read_guest(kind: str, data: bytes, most: int) -> Picture:
 
 def _read_16_bit(data: bytes, image: Image.Image | None, most: int) -> Picture | None:
     """The picture of a file with 16 bits a channel; None where it has fewer."""
-    if data.startswith(png.SIGNATURE):
+    if data.startswith(png.SIGNATURE) and image is not None:
         if png.bit_depth(data) != 16:
             return None
-        samples, turn = png.read_16_bit(data), None
-    elif data[:4] in tiff.MARKS:
-        found = tiff.read_16_bit(data, most)
-        if found is None:
-            return None
-        samples, turn = found
-    else:
+        samples, block = png.read_16_bit(data)
+        return _picture(samples, block, image.info.get("icc_profile"), turn=None)
+    found = tiff.read_16_bit(data, most) if data[:4] in tiff.MARKS else None
+    if found is None:
         return None
-    return _picture(samples, *_about(image), turn)
+    samples, turn, icc = found
+    if image is None:
+        return _picture(samples, tiff.described_raw(data), icc, turn)
+    return _picture(samples, tiff.described(image), image.info.get("icc_profile"), turn)
 
 
-def _read_8_bit(image: Image.Image | None) -> Picture:
+def _read_8_bit(data: bytes, image: Image.Image | None) -> Picture:
     """The picture of any file that Pillow decodes to 8 bits a channel."""
     if image is None:
         raise ImageError("this kind of TIFF file cannot be read")
@@ -211,13 +224,18 @@ def _read_8_bit(image: Image.Image | None) -> Picture:
         raise ImageError("only images of 8 or 16 whole-number bits a channel can be read")
     turn = 1 if image.format == "TIFF" else None  # Pillow turns TIFF files itself
     if image.mode in ("CMYK", "LAB"):
-        picture = _picture(np.asarray(_through_profile(image)), *_about(image), turn)
-        return replace(picture, icc=None)
+        samples = np.asarray(_through_profile(image))
+        return _picture(samples, _exif_block(image), None, turn)
+    clear = image.info.get("transparency")
+    if image.mode == "L" and image.format == "PNG" and isinstance(clear, int):
+        top = (1 << png.bit_depth(data)) - 1  # Pillow looks for the value among scaled samples
+        image.info["transparency"] = (clear & top) * 255 // top
     has_alpha = image.mode in ("LA", "La", "PA", "RGBA", "RGBa") or "transparency" in image.info
     is_grey = image.mode in ("1", "L", "LA", "La")
     mode = ("LA" if has_alpha else "L") if is_grey else ("RGBA" if has_alpha else "RGB")
     samples = np.asarray(image.convert(mode))
-    return _picture(samples.reshape(*samples.shape[:2], -1), *_about(image), turn)
+    block, icc = _exif_block(image), image.info.get("icc_profile")
+    return _picture(samples.reshape(*samples.shape[:2], -1), block, icc, turn)
 
 
 def _through_profile(image: Image.Image) -> Image.Image:
@@ -253,21 +271,14 @@ def _picture(
         pixels=samples[..., :3] if channels > 2 else np.repeat(samples[..., :1], 3, axis=2),
         alpha=samples[..., -1] if channels in (2, 4) else None,
         is_grey=channels < 3,
-        icc=icc,
+        icc=icc or None,
         exif=exif.upright(block) if block else None,
         focal_35mm=exif.focal_35mm(block) if block else None,
     )
 
 
-def _about(image: Image.Image | None) -> tuple[bytes | None, bytes | None]:
-    """EXIF block and colour profile of an opened file."""
-    if image is None:
-        return None, None
-    return _exif_block(image), image.info.get("icc_profile") or None
-
-
 def _exif_block(image: Image.Image) -> bytes | None:
-    """The EXIF block without prefix; None where there is none."""
+    """The EXIF block without prefix of an image that is decoded; None where there is none."""
     if image.format == "TIFF":
         return tiff.described(image)
     block = image.info.get("exif")
@@ -298,8 +309,7 @@ def encode_picture(
     ending = "." + ending.lower().removeprefix(".")
     if ending not in ENDINGS:
         raise ImageError(f"pictures cannot be written as {ending}, only as {', '.join(ENDINGS)}")
-    if picture.is_grey and _has_colour(picture.pixels):
-        picture = replace(picture, is_grey=False)
+    picture = _without_false_grey(picture)
     try:
         if ending in (".jpg", ".jpeg"):
             return _encode_jpeg(picture, quality)
@@ -311,7 +321,7 @@ def encode_picture(
             return _encode_jxl(picture, webp_quality)
         codec = png if ending == ".png" else tiff
         samples = _Channels(picture)
-        return codec.encode(samples, _profile_for(picture, samples.shape[2]), picture.exif)
+        return codec.encode(samples, profile_for(picture.icc, samples.shape[2]), picture.exif)
     except ImageError:
         raise
     except (OSError, ValueError, MemoryError, cv2.error) as error:
@@ -341,12 +351,14 @@ class _Channels:
         return np.concatenate([colours, picture.alpha[rows][..., None]], axis=2)
 
 
-def _has_colour(pixels: Pixels) -> bool:
-    """Whether any pixel is of another colour than a rounded grey."""
-    least = COLOURED * np.iinfo(pixels.dtype).max / 255
-    red, green, blue = (pixels[..., k] for k in range(3))
+def _without_false_grey(picture: Picture) -> Picture:
+    """The picture, no longer grey where a pixel is of another colour than a rounded grey."""
+    least = COLOURED * np.iinfo(picture.pixels.dtype).max / 255
+    red, green, blue = (picture.pixels[..., k] for k in range(3))
     pairs = (red, green), (green, blue), (blue, red)
-    return any(int(cv2.absdiff(a, b).max(initial=0)) > least for a, b in pairs)
+    if picture.is_grey and any(int(cv2.absdiff(a, b).max(initial=0)) > least for a, b in pairs):
+        return replace(picture, is_grey=False)
+    return picture
 
 
 def _pillow(samples: np.ndarray) -> Image.Image:
@@ -369,10 +381,25 @@ def _encode_jpeg(picture: Picture, quality: int) -> bytes:
     pixels = to_u8(picture.pixels)
     image = _pillow(_grey(pixels) if picture.is_grey else pixels)
     out = io.BytesIO()
-    profile = _profile_for(picture, 1 if picture.is_grey else 3)
-    block = exif.PREFIX + picture.exif if picture.exif else b""
+    profile = profile_for(picture.icc, 1 if picture.is_grey else 3)
+    block = _exif_for_jpeg(exif.PREFIX + picture.exif) if picture.exif else b""
     image.save(out, "JPEG", quality=quality, subsampling=0, icc_profile=profile, exif=block)
     return out.getvalue()
+
+
+def _exif_for_jpeg(block: bytes) -> bytes:
+    """The block; without the maker's note, or empty, where there is no room for all of it."""
+    from PIL import Image
+
+    if len(block) > JPEG_EXIF:
+        found = Image.Exif()
+        try:
+            found.load(block)
+            found.get_ifd(exif.EXIF_IFD).pop(exif.MAKER_NOTE, None)
+            block = found.tobytes()
+        except Exception:  # Pillow raises whatever a broken block makes it stumble over
+            return b""
+    return block if len(block) <= JPEG_EXIF else b""
 
 
 def _encode_webp(picture: Picture, quality: int) -> bytes:
@@ -383,7 +410,7 @@ def _encode_webp(picture: Picture, quality: int) -> bytes:
     how = {"lossless": True} if quality >= LOSSLESS else {"quality": quality}
     _pillow(_colours_and_alpha(picture)).save(
         out, "WEBP", **how, exact=True,  # exact: colours under transparency stay
-        icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
+        icc_profile=profile_for(picture.icc, 3) or b"", exif=picture.exif or b"",
     )  # fmt: skip
     return out.getvalue()
 
@@ -395,7 +422,7 @@ def _encode_avif(picture: Picture, quality: int) -> bytes:
     out = io.BytesIO()
     _pillow(_colours_and_alpha(picture)).save(
         out, "AVIF", quality=quality, subsampling="4:4:4", speed=AVIF_SPEED,
-        icc_profile=_profile_for(picture, 3) or b"", exif=_exif_for_avif(picture.exif),
+        icc_profile=profile_for(picture.icc, 3) or b"", exif=_exif_for_avif(picture.exif),
     )  # fmt: skip
     return out.getvalue()
 
@@ -417,7 +444,7 @@ def _exif_for_avif(block: bytes | None) -> bytes:
 def _encode_jxl(picture: Picture, quality: int) -> bytes:
     has_pair = picture.is_grey and picture.alpha is not None  # which the library does not take
     samples = _colours_and_alpha(picture) if has_pair else to_u8(_Channels(picture)[:])
-    icc = _profile_for(picture, samples.shape[2])
+    icc = profile_for(picture.icc, samples.shape[2])
     try:
         return guests.encode_jxl(samples, icc, picture.exif, quality)
     except (guests.GuestError, RuntimeError) as error:
@@ -430,10 +457,46 @@ def _colours_and_alpha(picture: Picture) -> RGB:
     return pixels if picture.alpha is None else np.dstack([pixels, to_u8(picture.alpha)])
 
 
-def _profile_for(picture: Picture, channels: int) -> bytes | None:
-    """The ICC profile, unless it is one for another number of colours than the file will hold."""
-    space = b"GRAY" if channels < 3 else b"RGB "
-    return picture.icc if picture.icc is not None and picture.icc[16:20] == space else None
+def profile_for(icc: bytes | None, channels: int) -> bytes | None:
+    """The ICC profile of a file of 1 to 4 channels, of which 3 have colours.
+
+    A grey one becomes one of colours with the same tones, so that all pixels stay as they are;
+    None for a profile of colours in a grey file, and for what cannot be read.
+    """
+    space, wanted = (icc or b"")[16:20], b"GRAY" if channels < 3 else b"RGB "
+    if space == wanted:
+        return icc
+    return _with_colours(icc) if icc and (space, wanted) == (b"GRAY", b"RGB ") else None
+
+
+def _with_colours(grey: bytes) -> bytes | None:
+    """The profile of sRGB with the tone curve, the name and the date of a grey one."""
+    from PIL import ImageCms
+
+    if grey[20:24] != b"XYZ ":  # its curve would be one of lightness
+        return None
+    try:
+        curve = _tags(grey)[b"kTRC"]
+        name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(grey))).strip()
+    except (KeyError, struct.error, OSError, ImageCms.PyCMSError):
+        return None
+    said = name.encode("utf-16-be")
+    own = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    tags = _tags(own) | dict.fromkeys((b"rTRC", b"gTRC", b"bTRC"), curve)
+    tags[b"desc"] = struct.pack(">4s3I4s2I", b"mluc", 0, 1, 12, b"enUS", len(said), 28) + said
+    at, table, body = 132 + 12 * len(tags), [struct.pack(">I", len(tags))], []
+    for tag, data in tags.items():
+        table.append(struct.pack(">4s2I", tag, at, len(data)))
+        body.append(data + bytes(-len(data) % 4))
+        at += len(body[-1])
+    return b"".join([struct.pack(">I", at), own[4:24], grey[24:36], own[36:128], *table, *body])
+
+
+def _tags(icc: bytes) -> dict[bytes, bytes]:
+    """An ICC profile's data by their signatures. Raises struct.error."""
+    count = struct.unpack_from(">I", icc, 128)[0]
+    listed = [struct.unpack_from(">4s2I", icc, 132 + 12 * k) for k in range(count)]
+    return {tag: icc[at : at + size] for tag, at, size in listed}
 
 
 def to_u8(pixels: np.ndarray) -> RGB:

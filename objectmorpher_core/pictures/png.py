@@ -26,27 +26,32 @@ def bit_depth(data: bytes) -> int:
     return data[24] if len(data) > 24 else 0
 
 
-def check_whole(data: bytes) -> None:
-    """ValueError where the file ends early or a chunk's checksum is wrong."""
-    if not any(kind == b"IEND" for kind, _ in _chunks(data)):
-        raise ValueError("the PNG file ends early")
-
-
-def read_16_bit(data: bytes) -> np.ndarray:
+def read_16_bit(data: bytes) -> tuple[np.ndarray, bytes | None]:
     """A 16-bit PNG's samples (H, W, 1..4) u16: grey, grey + alpha, RGB or RGBA; as stored.
 
-    Raises ValueError where the file is broken.
+    And its EXIF block, which may stand behind the pixels. Raises ValueError where the file is
+    broken, or ends early: OpenCV would write its complaints to stderr.
     """
-    check_whole(data)  # OpenCV would write its complaints to stderr
+    found = dict(_chunks(data))
+    if b"IEND" not in found:
+        raise ValueError("the PNG file ends early")
     stored = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if stored is None:
         raise ValueError("the PNG data is damaged")
+    return _samples(stored, data[25], found.get(b"tRNS")), found.get(b"eXIf")
+
+
+def _samples(stored: np.ndarray, colour_type: int, transparent: bytes | None) -> np.ndarray:
+    """(H, W, 1..4) of what OpenCV returns, which of grey with one clear value leaves out that."""
     if stored.ndim == 2:
-        return stored[..., None]
+        grey = stored[..., None]
+        if transparent is None or len(transparent) != 2:
+            return grey
+        is_opaque = grey != struct.unpack(">H", transparent)[0]
+        return np.concatenate([grey, is_opaque * np.uint16(65535)], axis=2)
     if stored.shape[2] == 4:
         rgba = cv2.cvtColor(stored, cv2.COLOR_BGRA2RGBA)
-        has_one_colour = data[25] in (GREY, GREY_ALPHA)
-        return rgba[..., [0, 3]] if has_one_colour else rgba
+        return rgba[..., [0, 3]] if colour_type in (GREY, GREY_ALPHA) else rgba
     return cv2.cvtColor(stored, cv2.COLOR_BGR2RGB)
 
 
@@ -127,7 +132,7 @@ def _chunk(kind: bytes, body: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """(kind, body) of every chunk whose checksum holds; ValueError at the first that breaks."""
+    """(kind, body) of every chunk to the last; ValueError at the first whose checksum is wrong."""
     at = len(SIGNATURE)
     while at + 12 <= len(data):
         length = struct.unpack_from(">I", data, at)[0]
@@ -138,4 +143,6 @@ def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
         ):
             raise ValueError("the PNG file is damaged or ends early")
         yield data[at + 4 : at + 8], body
+        if data[at + 4 : at + 8] == b"IEND":
+            return
         at += 12 + length

@@ -18,7 +18,7 @@ import numpy as np
 from ..base.threads import core_count
 from ..compose.layers import Layer
 from ..document.bounds import MULTIPLY, NORMAL, SCREEN, SOFT_LIGHT
-from .image import ImageError, Picture
+from .image import ImageError, Picture, profile_for
 
 MOST_SIDE = 30_000  # px, of the format
 MOST_BYTES = (1 << 31) - 1
@@ -92,9 +92,7 @@ def _nothing() -> dict[int, np.ndarray | None]:
 def _resources(merged: Picture) -> bytes:
     names = "".join((_text(PROGRAM), _text(PROGRAM)))
     version = struct.pack(">IB", 1, True) + names.encode("utf-16-be") + struct.pack(">I", 1)
-    found = {VERSION: version, ICC: merged.icc, EXIF: merged.exif}
-    if merged.icc is not None and merged.icc[16:20] != b"RGB ":
-        found[ICC] = None
+    found = {VERSION: version, ICC: profile_for(merged.icc, 3), EXIF: merged.exif}
     return b"".join(
         MARK + struct.pack(">HxxI", number, len(data)) + _padded(data, 2)
         for number, data in sorted(found.items()) if data

@@ -29,8 +29,8 @@ STRIP_BYTES = 1 << 20  # of pixels; a strip is what readers hold at a time
 KEPT_TAGS = (270, 271, 272, 282, 283, 296, 305, 306, 315, 33432, 0x8769, 0x8825)
 
 
-def read_16_bit(data: bytes, max_pixels: int) -> tuple[np.ndarray, int] | None:
-    """Samples (H, W, 1..4) u16 as stored and the orientation 1..8; None for fewer bits.
+def read_16_bit(data: bytes, max_pixels: int) -> tuple[np.ndarray, int, bytes | None] | None:
+    """Samples (H, W, 1..4) u16 as stored, orientation 1..8 and profile; None for fewer bits.
 
     Raises ValueError for floating point, for more than 16 bits or `max_pixels`, and where the
     file is broken.
@@ -63,7 +63,9 @@ def read_16_bit(data: bytes, max_pixels: int) -> tuple[np.ndarray, int] | None:
     if extra == ASSOCIATED_ALPHA:
         samples = _unpremultiplied(samples)
     tag = page.tags.get(274)
-    return samples, int(tag.value) if tag is not None and 1 <= int(tag.value) <= 8 else 1
+    turn = int(tag.value) if tag is not None and 1 <= int(tag.value) <= 8 else 1
+    icc = page.iccprofile
+    return samples, turn, icc if isinstance(icc, bytes) else None
 
 
 def _decode(page, data: bytes) -> np.ndarray:
@@ -150,7 +152,10 @@ def described(image: Image.Image) -> bytes | None:
 
 
 def described_raw(data: bytes) -> bytes | None:
-    """EXIF block of what a RAW file that is built like a TIFF says; None for all others."""
+    """EXIF block of what a file that is built like a TIFF says, whoever decodes it.
+
+    None where it says nothing, and for all other files.
+    """
     if data[:4] not in MARKS[:2]:
         return None
     fields = _described_by(data)

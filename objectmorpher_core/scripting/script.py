@@ -64,7 +64,7 @@ class BatchItem:
 def parse_scripts(text: str) -> tuple[BatchItem, ...]:
     """The edits in the JSON of `--script`: one object, or an array of them. Raises ScriptError."""
     try:
-        data = json.loads(text)
+        data = json.loads(text.removeprefix("\ufeff"))  # with which editors of Windows mark UTF-8
     except json.JSONDecodeError as error:
         raise ScriptError(f"the script is not JSON: {error.msg} in line {error.lineno}") from error
     except (ValueError, RecursionError) as error:  # a number of thousands of digits; depth

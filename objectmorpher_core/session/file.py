@@ -31,7 +31,7 @@ from ..document.model import SELECTED, Document, EditObject, KeyPose, Photo
 from ..document.paint import SIDE
 from ..document.settings import LEAST_FEATHER, MOST_FEATHER
 from ..pictures.image import ImageError, encode_picture, read_picture
-from .tree import ArrayError, SessionError, TreeReader, TreeWriter, read_npy
+from .tree import ArrayError, SessionError, TreeReader, TreeWriter, encode_tree, read_npy
 from .zip import FilePieces, Member, Npy, Zip, digest, scratch_file, write_zip
 
 __all__ = [
@@ -98,8 +98,8 @@ def write_session(document: Document, file: IO[bytes], folder: Path | None = Non
             "document": tree,
             "sha256": {name: digest(member) for name, member in members.items()},
         }
-        text = json.dumps(head, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
-        write_zip(file, {DOCUMENT: text.encode()} | members)
+        text = encode_tree(head, indent=1, sort_keys=True)
+        write_zip(file, {DOCUMENT: text} | members)
 
 
 def decode_session(data: bytes) -> Document:

@@ -28,7 +28,7 @@ from ..base.limits import SESSION_UNPACKED as MAX_BYTES
 from ..document.model import Document, Photo
 from ..pictures.image import MAX_PIXELS, Picture, encode_picture
 from .file import build_document
-from .tree import ArrayError, SessionError, TreeWriter, read_npy
+from .tree import ArrayError, SessionError, TreeWriter, encode_tree, read_npy
 
 FORMAT = "objectmorpher recovery"
 VERSION = 1
@@ -79,9 +79,9 @@ class Journal:
             "arrays": {p: self._file(a, p, kept) for p, a in collector.arrays.items()},
             "document": tree,
         }
-        text = json.dumps(head, ensure_ascii=False, allow_nan=False)
+        text = encode_tree(head)
         sync_folder(self.folder)  # the arrays' names first: a power cut may turn their order round
-        write_all({self.folder / DOCUMENT: text.encode()})
+        write_all({self.folder / DOCUMENT: text})
         self._names = kept
         self._remove_others({DOCUMENT} | {name for _, name in kept.values()})
 

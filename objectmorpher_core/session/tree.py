@@ -6,6 +6,7 @@ An array becomes {"png": member} where it is a mask or 8- or 16-bit pixels, else
 from __future__ import annotations
 
 import io
+import json
 import math
 import types
 from collections.abc import Mapping
@@ -31,6 +32,15 @@ A_MASK = np.zeros((0, 0), bool)
 
 class SessionError(ValueError):
     """The file is not a session that can be opened; one sentence."""
+
+
+def encode_tree(tree: Any, **layout: Any) -> bytes:
+    """The UTF-8 file of JSON values. Of a file's name that is not UTF-8 the odd bytes are escaped.
+
+    Raises ValueError for numbers beyond the finite ones.
+    """
+    text = json.dumps(tree, ensure_ascii=False, allow_nan=False, **layout)
+    return text.encode("utf-8", "backslashreplace")  # only halves of pairs: as JSON writes them
 
 
 @dataclass

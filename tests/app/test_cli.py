@@ -391,6 +391,18 @@ def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
     assert not re.search(r"True|False|None|[][{}_]", said)
 
 
+def test_a_photo_whose_name_is_not_utf_8_has_a_session(folder):
+    name = os.fsdecode(b"caf\xe9")
+    try:
+        Path("photo.png").rename(f"{name}.png")
+    except OSError as error:
+        pytest.skip(f"no such names here: {error}")
+    assert _edit(*TURN, "--session", f"{name}.omorph", photo=f"{name}.png") == 0
+    assert cli.main(["replay", f"{name}.omorph", "-o", "again.png"]) == 0
+    assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
+    assert cli.main(["share", f"{name}.omorph", "-o", "page.html"]) == 0
+
+
 def test_a_session_of_an_object_cut_by_the_frame_gives_the_same_bytes(folder):
     inside = shapes.mask("frame")
     Path("photo.png").write_bytes(shapes.png(shapes.picture(inside)))

@@ -76,6 +76,17 @@ def test_as_much_is_read_as_was_announced_and_allowed(server: HttpServer) -> Non
     assert ask(server, "5", b"1234") == (400, {"error": "fewer bytes came than were announced"})
 
 
+@pytest.mark.parametrize(("path", "status"), [("/", 413), ("/elsewhere", 403)])
+def test_who_is_refused_while_sending_can_read_why(
+    server: HttpServer, path: str, status: int
+) -> None:
+    for _ in range(3):
+        connection = http.client.HTTPConnection(*server.address, timeout=10)
+        connection.request("POST", path, bytes(16 << 20))
+        assert connection.getresponse().status == status
+        connection.close()
+
+
 def test_who_is_not_admitted_is_told_before_anything_is_read(server: HttpServer) -> None:
     told = {"error": "not here", "place": "/elsewhere"}
     assert ask(server, "9" * 30, path="/elsewhere") == (403, told)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from objectmorpher_core.pictures.image import (
     encode_mask,
     encode_picture,
     encode_pil,
+    pil_of,
     read_mask,
     read_picture,
     resized,
@@ -100,6 +102,9 @@ def test_a_grey_photo_that_something_coloured_came_into_has_colour(ending, is_de
     back = read_picture(encode_picture(Picture(painted, is_grey=True), ending))
     np.testing.assert_array_equal(back.pixels, painted)
     assert not back.is_grey
+    shown = pil_of(Picture(painted, is_grey=True))
+    np.testing.assert_array_equal(np.asarray(shown), to_u8(painted))
+    assert pil_of(Picture(pixels, is_grey=True)).mode == ("I;16" if pixels.itemsize > 1 else "L")
 
 
 @pytest.mark.parametrize("ending", DEEP)
@@ -175,11 +180,133 @@ def test_profile_and_exif_are_kept(ending, chelsea):
     assert exif.get_ifd(0x8769)[0x927C] == b"a maker's note"
 
 
-def test_a_grey_profile_never_reaches_a_colour_file(chelsea):
+@over("note", [60_000, 100_000])
+@over("more", [0, 80_000])
+def test_a_jpeg_keeps_as_much_exif_as_it_has_room_for(note, more, chelsea):
+    """64 kB: without a long maker's note, and without any where the rest is too long, too."""
+    exif = exif_block(1)
+    exif.get_ifd(0x8769)[0x927C] = bytes(note)
+    exif[0x013B] = "x" * more
+    picture = Picture(chelsea, exif=exif.tobytes().removeprefix(b"Exif\0\0"))
+    back = read_picture(encode_picture(picture, ".jpg"))
+    assert back.focal_35mm == (None if more else 35.0)
+    if not more:
+        kept = Image.Exif()
+        kept.load(back.exif)
+        assert kept[0x010F] == "A camera"
+        assert (0x927C in kept.get_ifd(0x8769)) == (note < 65_000)
+    assert read_picture(encode_picture(picture, ".png")).focal_35mm == 35.0
+
+
+def chunks_of(data: bytes) -> list[bytes]:
+    """A PNG's chunks, whole."""
+    found, at = [], len(png.SIGNATURE)
+    while at < len(data):
+        end = at + 12 + struct.unpack_from(">I", data, at)[0]
+        found.append(data[at:end])
+        at = end
+    return found
+
+
+def chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+@over("kind", ["behind the pixels", "grey alpha", "further channel"])
+def test_16_bit_files_are_described_wherever_that_stands(kind, chelsea):
+    """Behind a PNG's pixels, and in a TIFF of channels that Pillow cannot read."""
+    pixels = deep(chelsea[:20, :30])
+    block = exif_block(1).tobytes().removeprefix(b"Exif\0\0")
+    if kind == "behind the pixels":
+        *before, end = chunks_of(encode_picture(Picture(pixels, icc=SRGB), "png"))
+        data = b"".join([png.SIGNATURE, *before, chunk(b"eXIf", block), end])
+    elif kind == "grey alpha":
+        grey = pictures(pixels)["grey alpha"]
+        data = encode_picture(replace(grey, icc=GREY_PROFILE, exif=block), "tif")
+    else:
+        data = tiff_bytes(
+            np.dstack([pixels, pixels[..., :2]]), photometric="rgb", iccprofile=SRGB,
+            extrasamples=["unassalpha", "unspecified"],
+            extratags=[(271, 2, None, "A camera", True)],  # tifffile writes no directory of EXIF
+        )  # fmt: skip
+    back = read_picture(data)
+    assert back.icc == (GREY_PROFILE if kind == "grey alpha" else SRGB)
+    assert back.focal_35mm == (None if kind == "further channel" else 35.0)
+    exif = Image.Exif()
+    exif.load(back.exif)
+    assert exif[0x010F] == "A camera"
+
+
+@over("bits", [1, 2, 4, 8, 16])
+def test_one_value_of_a_grey_png_may_be_clear(bits):
+    most = (1 << bits) - 1
+    values = np.arange(most + 1) if bits <= 8 else np.arange(0, most + 1, 257)
+    for clear in (0, 1, most):
+        values[-2:] = clear, most - clear  # of 16 bits, too, one that is just beside another
+        stored = sum(int(v) << bits * k for k, v in enumerate(values[::-1]))
+        width = bits * len(values)
+        row = b"\0" + (stored << -width % 8).to_bytes(-(-width // 8), "big")
+        head = struct.pack(">IIBBBBB", len(values), 1, bits, 0, 0, 0, 0)
+        parts = {b"IHDR": head, b"tRNS": struct.pack(">H", clear), b"IDAT": zlib.compress(row)}
+        data = b"".join(chunk(*part) for part in [*parts.items(), (b"IEND", b"")])
+        picture = read_picture(png.SIGNATURE + data)
+        assert picture.is_grey and picture.alpha is not None
+        np.testing.assert_array_equal(picture.alpha[0] == 0, values == clear)
+        top = np.iinfo(picture.pixels.dtype).max
+        np.testing.assert_array_equal(picture.pixels[0, :, 0], values * top // most)
+
+
+def grey_profile(gamma: float) -> bytes:
+    """An ICC profile of greys, as Photoshop's "Gray Gamma"."""
+    white = struct.pack(">4s4x3i", b"XYZ ", 63190, 65536, 54061)
+    name = "Grey".encode("utf-16-be")
+    tags = {
+        b"desc": struct.pack(">4s3I4s2I", b"mluc", 0, 1, 12, b"enUS", len(name), 28) + name,
+        b"wtpt": white,
+        b"kTRC": struct.pack(">4s4xIHxx", b"curv", 1, round(gamma * 256)),
+    }
+    table, body, at = struct.pack(">I", len(tags)), b"", 132 + 12 * len(tags)
+    for tag, data in tags.items():
+        table += struct.pack(">4s2I", tag, at + len(body), len(data))
+        body += data + bytes(-len(data) % 4)
+    head = struct.pack(">I4xI4s4s4s", at + len(body), 0x0420_0000, b"mntr", b"GRAY", b"XYZ ")
+    head += struct.pack(">6H4s28x", 2026, 11, 30, 0, 0, 0, b"acsp") + white[8:]
+    return head + bytes(128 - len(head)) + table + body
+
+
+def as_srgb(image: Image.Image) -> np.ndarray:
+    own = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"]))
+    found = ImageCms.profileToProfile(image, own, ImageCms.createProfile("sRGB"), outputMode="RGB")
+    return np.asarray(found).astype(int)
+
+
+@over("gamma", [1.0, 2.2, 1.8])
+@over("ending", [".webp", ".avif", ".png", ".tif", ".jpg"])
+def test_a_grey_photos_tones_are_kept_where_a_file_has_colours(gamma, ending):
+    """In a format without grey, and where something coloured came into the photo."""
+    pixels = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2).repeat(8, axis=0)
+    picture = Picture(pixels, is_grey=True, icc=grey_profile(gamma))
+    grey = Image.open(io.BytesIO(encode_picture(picture, ".png")))
+    assert grey.mode == "L" and grey.info["icc_profile"] == picture.icc
+    colours = Image.open(io.BytesIO(encode_picture(replace(picture, is_grey=False), ending)))
+    assert colours.mode == "RGB"
+    light = (pixels / 255) ** gamma
+    truth = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    slack = 3 * 13 if ending == ".avif" else 1  # lossy, and the dark tones of gamma 1 are steep
+    assert np.abs(as_srgb(colours) - 255 * truth).max() <= slack
+    assert (
+        colours.info["icc_profile"] == pil_of(replace(picture, is_grey=False)).info["icc_profile"]
+    )
+    if slack == 1:
+        np.testing.assert_array_equal(np.asarray(colours), pixels)
+
+
+def test_a_profile_that_does_not_fit_is_left_out(chelsea):
     grey = np.repeat(chelsea[..., :1], 3, axis=2)
-    picture = Picture(grey, is_grey=True, icc=GREY_PROFILE)
+    picture = Picture(grey, is_grey=True, icc=GREY_PROFILE)  # which has no tones
     assert read_picture(encode_picture(picture, "png")).icc == GREY_PROFILE
     assert read_picture(encode_picture(picture, "webp")).icc is None
+    assert read_picture(encode_picture(replace(picture, icc=SRGB), "png")).icc is None
 
 
 @over("orientation", range(1, 9))
@@ -388,6 +515,25 @@ def test_every_mode_of_pillow_becomes_a_picture(mode: str, chelsea: np.ndarray) 
     ):
         image = image.convert(step)
     assert read_picture(encode_pil(image)).pixels.shape == (20, 30, 3)
+
+
+@over("mode", ["L", "RGB", "CMYK", "I;16"])
+@over("kind", ["JPEG", "TIFF", "PNG", "WEBP"])
+@over("orientation", [1, 6])
+def test_an_image_of_pillow_is_the_photo_of_its_file(mode, kind, orientation, chelsea) -> None:
+    if {"CMYK": "PNG WEBP", "I;16": "JPEG WEBP"}.get(mode, "").count(kind):
+        return  # no such files
+    image = Image.fromarray(chelsea[:20, :30])
+    deep_grey = Image.fromarray(deep(chelsea[:20, :30, 0]))
+    image = deep_grey if mode == "I;16" else image.convert(mode)
+    icc = {"L": GREY_PROFILE, "I;16": GREY_PROFILE, "RGB": SRGB}.get(mode)
+    exif = Image.Exif()
+    exif.load(exif_block(orientation).tobytes())  # what TIFF files take it from
+    data = pil_bytes(image, kind, exif=exif, icc_profile=icc)
+    direct, opened = read_picture(data), read_picture(encode_pil(Image.open(io.BytesIO(data))))
+    assert_same(opened, direct)
+    assert opened.icc == direct.icc
+    assert opened.focal_35mm == direct.focal_35mm == 35.0
 
 
 def test_a_tiff_channel_that_is_no_alpha_is_left_out_at_any_depth(chelsea: np.ndarray) -> None:

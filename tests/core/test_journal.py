@@ -24,9 +24,11 @@ def document() -> Document:
 
 
 def test_what_was_written_is_read(document: Document, tmp_path: Path) -> None:
-    Journal(tmp_path).write(document, {"name": "cat.png"})
-    assert_equal(read_journal(tmp_path), document)
-    assert read_about(tmp_path) == {"name": "cat.png"}
+    for name in ("cat.png", "caf\udce9.png"):  # the second is of a file whose name is not UTF-8
+        named = replace(document, photo=replace(document.photo, name=name))
+        Journal(tmp_path).write(named, {"name": name, "source": f"/photos/{name}"})
+        assert_equal(read_journal(tmp_path), named)
+        assert read_about(tmp_path) == {"name": name, "source": f"/photos/{name}"}
 
 
 def test_a_step_writes_only_what_is_new_in_it(document: Document, tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ SCRIPTS = (
 def test_what_is_written_is_read_as_it_was(script: dict) -> None:
     (item,) = parse_scripts(json.dumps(script))
     assert parse_scripts(script_text(item)) == (item,)
+    assert parse_scripts("\ufeff" + json.dumps(script)) == (item,), "marked as UTF-8"
 
 
 def test_defaults_are_not_written() -> None:

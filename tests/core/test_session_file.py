@@ -121,6 +121,16 @@ def test_round_trip(document):
     assert_equal(decode_session(encode_session(document)), document)
 
 
+def test_a_name_that_is_not_utf_8_comes_back_and_others_stay_readable(document):
+    """Linux lets any bytes name a file; Python reads each odd one as half of a surrogate pair."""
+    photo = dataclasses.replace(document.photo, name="caf\udce9.png")
+    named = dataclasses.replace(document, photo=photo)
+    data = encode_session(named)
+    assert_equal(decode_session(data), named)
+    text = members_of(data)["document.json"].decode("utf-8")
+    assert '"caf\\udce9.png"' in text and '"Näse"' in text
+
+
 def test_copies_are_copies_again(document):
     """What only has the same mask is none."""
     other = dataclasses.replace(document.objects[0].lifted, doubt=0.5)

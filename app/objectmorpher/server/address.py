@@ -83,6 +83,10 @@ class NotServed(Exception):
     """The server does not do that, and is there all the same; one sentence."""
 
 
+class TooMuch(Exception):
+    """The server takes smaller requests only, and is there all the same; one sentence."""
+
+
 class ServedError(ValueError):
     """The server ran the job, and the job failed as it would have here; one sentence."""
 

@@ -6,14 +6,14 @@ import http.client
 import json
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from objectmorpher_core.base.limits import ANSWER_BYTES as MOST_ANSWER
 from objectmorpher_core.base.limits import ANSWER_LINE as MOST_LINE
 from objectmorpher_core.base.progress import Progress
 
-from .address import PROTOCOL, NotServed, ServedError, Server, ServerLost
+from .address import PROTOCOL, NotServed, ServedError, Server, ServerLost, TooMuch
 from .fitting import fits, is_sound
 from .message import MessageError, WireMessage, decode, encode
 from .table import table, types
@@ -32,7 +32,7 @@ def hello(server: Server) -> dict[str, Any]:
         response = connection.getresponse()
         told = _json(response)
         if response.status != 200:
-            raise ServerLost(_refused(server, response.status, told))
+            raise _refusal(server, response.status, told)
     if told.get("product") != "objectmorpher" or told.get("protocol") != PROTOCOL:
         raise ServerLost(f"{server.address} is no server of this version")
     return told
@@ -41,17 +41,17 @@ def hello(server: Server) -> dict[str, Any]:
 def call(server: Server, name: str, arguments: tuple[Any, ...], progress: Progress) -> Any:
     """The answer of the job function `name`.
 
-    Raises ServerLost where the server gave none, NotServed where it never will, ServedError where
-    the job failed, and Cancelled out of `progress`, which ends the job over there, too.
+    Raises ServerLost where the server gave none, NotServed where it never will, TooMuch where it
+    would to less, ServedError where the job failed, and Cancelled out of `progress`, which ends
+    the job over there, too.
     """
     served = table()[name]
     message = encode(arguments, types(), is_split=True)
     for _ in range(ROUNDS):
         progress(0.0, "asking the server")
         with _connection(server) as connection:
-            headers = _headers(server)
-            connection.request("POST", _path(server, f"jobs/{name}"), message.body, headers)
-            response = connection.getresponse()
+            path, headers = _path(server, f"jobs/{name}"), _headers(server)
+            response = _answer(connection, "POST", path, message.body, headers)
             if response.status == 200:
                 body = _listen(server, response, progress)
                 break
@@ -59,7 +59,7 @@ def call(server: Server, name: str, arguments: tuple[Any, ...], progress: Progre
         if response.status == 404 and told:  # its own word, not that of a proxy before it
             raise NotServed(f"{server.address} does not {served.stage}")
         if response.status != 409:
-            raise ServerLost(_refused(server, response.status, told))
+            raise _refusal(server, response.status, told)
         _send_blobs(server, message, told.get("missing"), progress)
     else:
         raise ServerLost(f"{server.address} keeps losing the photo")
@@ -81,11 +81,21 @@ def _send_blobs(server: Server, message: WireMessage, names: Any, progress: Prog
         with _connection(server) as connection:
             headers = _headers(server) | {"Content-Length": str(len(body))}
             pieces = _pieces(body, progress)
-            connection.request("PUT", _path(server, f"blobs/{name}"), pieces, headers)
-            response = connection.getresponse()
+            path = _path(server, f"blobs/{name}")
+            response = _answer(connection, "PUT", path, pieces, headers)
             told = _json(response)
             if response.status != 201:
-                raise ServerLost(_refused(server, response.status, told))
+                raise _refusal(server, response.status, told)
+
+
+def _answer(
+    connection: http.client.HTTPConnection, method: str, path: str,
+    body: bytes | Iterator[memoryview], headers: dict[str, str],
+) -> http.client.HTTPResponse:  # fmt: skip
+    """The answer, which a server that refuses may have given before all was sent."""
+    with suppress(BrokenPipeError, ConnectionResetError):
+        connection.request(method, path, body, headers)
+    return connection.getresponse()
 
 
 def _pieces(body: bytes, progress: Progress) -> Iterator[memoryview]:
@@ -179,11 +189,12 @@ def _json(response: http.client.HTTPResponse) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _refused(server: Server, status: int, told: dict[str, Any]) -> str:
+def _refusal(server: Server, status: int, told: dict[str, Any]) -> ServerLost | TooMuch:
     if status == 401:
-        return f"{server.address} does not accept the token"
+        return ServerLost(f"{server.address} does not accept the token")
     reason = told.get("error")
-    return f"{server.address} refused: {_text(reason) if reason else f'HTTP {status}'}"
+    sentence = f"{server.address} refused: {_text(reason) if reason else f'HTTP {status}'}"
+    return TooMuch(sentence) if status == 413 else ServerLost(sentence)
 
 
 def _text(value: Any) -> str:

@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 
 AWAY = 60.0  # s that a lost server is left alone
 LOST, NOT_SERVED = "ServerLost", "NotServed"  # names of JobErrors: the job is to be done here
+TOO_LARGE = "TooMuch"  # so is this one, and the next may go there again
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Elsewhere:
             self._not_served.add((server, function.__name__))
         elif name == LOST:
             self.lose(sentence)
-        return name in (LOST, NOT_SERVED)
+        return name in (LOST, NOT_SERVED, TOO_LARGE)
 
     def is_away(self, server: Server) -> bool:
         return server == self._lost and time.monotonic() < self._until

@@ -17,8 +17,10 @@ import logging
 import queue
 import socket
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from email.message import Message
 from functools import partial
@@ -46,6 +48,7 @@ from .table import Table, types
 IDLE = 30.0  # s that a connection may say nothing
 PIECE = 1 << 20  # bytes read at a time
 MOST_DIGITS = 18  # of a length that is announced
+DRAINING = 2.0  # s that what was refused may go on coming
 POLL = 0.1  # s until `close` is noticed
 NOTHING = "there is nothing of that name"
 FAILED = "the computer that serves this has failed"
@@ -193,12 +196,23 @@ class Handler(BaseHTTPRequestHandler):
         except Refusal as refusal:
             log.info("Refused %r: %s", self.path[:80], refusal)
             self.send_json(refusal.status, refusal.answer)
+            self._drain()
         except OSError:  # nobody listens any more
             raise
         except Exception:
             log.exception("%r cannot be answered", self.path[:80])
             if not self.has_begun:
                 self.send_json(HTTPStatus.INTERNAL_SERVER_ERROR, {"error": FAILED})
+
+    def _drain(self) -> None:
+        """Let what still comes run out: a connection closed on it would take the answer along."""
+        end = time.monotonic() + DRAINING
+        with suppress(OSError):  # it has gone, or says nothing
+            self.connection.shutdown(socket.SHUT_WR)
+            while (left := end - time.monotonic()) > 0:
+                self.connection.settimeout(left)
+                if not self.rfile.read1(PIECE):
+                    break
 
     def read_body(self, most: int) -> bytes:
         """Read as many bytes as were announced, at most `most`. Raises Refusal."""

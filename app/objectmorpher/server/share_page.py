@@ -98,7 +98,7 @@ def _page(
     }  # fmt: skip
     values |= {name: _text(f"assets/share/{name}") for name in PARTS}
     page = re.sub(r"\{\{(\S+?)\}\}", lambda part: values[part[1]], _text("assets/share/page.html"))
-    return page.encode()
+    return page.encode("utf-8", "replace")  # in a title: a file's name may be no UTF-8
 
 
 def _background(document: Document, index: int) -> np.ndarray:

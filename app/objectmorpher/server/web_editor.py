@@ -76,7 +76,7 @@ QUESTIONS = {  # what may be asked, and what a question of it holds
     "lift": set[str](),
     "render": {"what", "points", "quats", "turn", "shift"},
 }
-KEPT_ENDINGS = (".jpg", ".jpeg", ".png")  # a photo is given back as what it came; else PNG
+KEPT_ENDINGS = (".jpg", ".jpeg", ".png")  # as which an opaque photo is given back; else PNG
 # The page runs the page of `share` in a frame of its own, which brings its programs along.
 POLICY = (
     "default-src 'none'; img-src 'self' data: blob:; style-src 'unsafe-inline'; connect-src 'self';"
@@ -149,7 +149,8 @@ class WebEdit:
             self.files[what] = f"{stem}.omorph", encode_session(document)
             return
         edited = pipeline.replay(document, part(progress, 0.6, 1.0))
-        usual = ending if ending in KEPT_ENDINGS else ".png"
+        is_kept = ending in KEPT_ENDINGS and document.photo.picture.alpha is None
+        usual = ending if is_kept else ".png"
         name = f"{stem} edited{'.psd' if what == 'layers' else usual}"
         self.files[what] = name, encode_output(what, edited, Path(name))
 

@@ -24,13 +24,16 @@ from objectmorpher.server.address import (
     Address,
     AddressError,
     Server,
+    ServerLost,
     TokenError,
+    TooMuch,
     fingerprint,
     make_token,
     read_token,
     write_token,
 )
 from objectmorpher.server.client import call
+from objectmorpher.server.elsewhere import Elsewhere, Remote
 from objectmorpher.server.front import Front
 from objectmorpher.server.table import table
 from objectmorpher.worker import job_functions
@@ -100,6 +103,17 @@ def test_what_a_server_does_not_do_is_done_here_and_the_rest_there(desk: Desk, f
     desk.wait()
     assert len(desk.answers) == 3 and desk.said == [] and desk.errors == []
     assert desk.runner.asked == ["fill_variants"]
+
+
+def test_what_is_too_large_for_a_server_does_not_lose_it() -> None:
+    server, said = Server(Address("127.0.0.1", 1), TOKEN), []
+    elsewhere = Elsewhere(lambda: server, lambda _, why: said.append(why))
+    function = job_functions.fill_variants
+    assert elsewhere.takes_back(function, TooMuch.__name__, "it takes less")
+    assert not elsewhere.is_away(server) and said == []
+    assert isinstance(elsewhere.placed(function), Remote), "the next may go there"
+    assert elsewhere.takes_back(function, ServerLost.__name__, "it is gone")
+    assert elsewhere.is_away(server) and said == ["it is gone"]
 
 
 def test_what_is_not_worth_it_stays_here(desk: Desk, tmp_path: Path) -> None:

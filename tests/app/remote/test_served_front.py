@@ -25,7 +25,7 @@ from test_message import HOSTILE
 
 from objectmorpher.editor.settings import STAGES
 from objectmorpher.server import client
-from objectmorpher.server.address import Address, ServedError, Server, ServerLost
+from objectmorpher.server.address import Address, ServedError, Server, ServerLost, TooMuch
 from objectmorpher.server.client import hello
 from objectmorpher.server.front import Front, RequestLimits
 from objectmorpher.server.message import LARGE, digest, encode
@@ -225,6 +225,15 @@ def test_too_large_a_body_is_refused_before_it_is_read(front: Listening) -> None
         status, told = ask(front, "POST", "/v1/jobs/halve", b"", Content_Length=str(length))
         assert status == 413
         assert "MB" in told["error"]
+
+
+def test_what_is_too_large_is_said_to_be_so_and_nothing_is_lost(server: Server) -> None:
+    large = np.zeros(MOST, np.float32)
+    for _ in range(3):
+        with pytest.raises(TooMuch, match="refused: more than 4 MB are not taken"):
+            client.call(server, "halve", (large,), silent)
+    small = large[: MOST // 8]
+    np.testing.assert_array_equal(client.call(server, "halve", (small,), silent), small)
 
 
 @pytest.mark.parametrize("length", ["", "-1", "1e3", "0x10", "²"])

@@ -8,6 +8,7 @@ import io
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from objectmorpher.cli.parser import main
-from objectmorpher.server.web_editor import MOST_EDITS, WebServer, posed_as_shown
+from objectmorpher.server.web_editor import MOST_EDITS, WebEdit, WebServer, posed_as_shown
+from objectmorpher_core.base.progress import silent
 from objectmorpher_core.base.rotations import quats_from_matrices
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document.edits import EditError
@@ -203,6 +205,22 @@ def test_an_edit_by_http_gives_the_very_pixels_of_the_command_line(
 
 
 # ---- with a browser ---------------------------------------------------------------------------
+
+
+@over("name", ["cut.jpg", "cut.png"])
+def test_a_photo_with_transparency_is_saved_whatever_its_name(name: str) -> None:
+    """A PNG file may be called .jpg."""
+    document = scene()
+    picture = document.photo.picture
+    alpha = np.full(picture.pixels.shape[:2], 255, np.uint8)
+    alpha[:4] = 0
+    photo = replace(document.photo, name=name, picture=replace(picture, alpha=alpha), source=b"")
+    document = replace(document, photo=photo)
+    edit = WebEdit(document, lifted=document)
+    edit.render(shown(9999, what="photo"), silent)
+    saved, data = edit.files["photo"]
+    assert saved == "cut edited.png"
+    assert (np.asarray(Image.open(io.BytesIO(data)))[:4, :, 3] == 0).all()
 
 
 def screen_place(page: Browser, x: float, y: float) -> tuple[float, float]:
