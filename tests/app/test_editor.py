@@ -16,8 +16,9 @@ from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.brush_tools import MaskTool
-from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.pointer import Button, Pointer
 from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher.tools.select_tool import SelectTool
 from objectmorpher.worker.requests import LIFT
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
@@ -186,6 +187,32 @@ def test_while_an_object_is_lifted_no_one_is_told_to_lift_it(editor: Editor) -> 
     editor.jobs.cancel()
     wait_for_jobs(editor)
     assert why_not(editor, "pose") == "Lift an object first"
+
+
+def test_what_is_being_lifted_is_not_selected_otherwise_by_what_was_meant_as_a_pin(
+    editor: Editor,
+) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    before = editor.mask
+    run(editor, "lift")
+    pinned = editor.view.canvas_from_image(np.array(CENTRE) + (6.0, 4.0))
+    stroke(editor, SelectTool(), pinned, pinned, button=Button.RIGHT)
+    assert editor.message is not None and "being lifted" in editor.message.text
+    wait_for_jobs(editor)
+    assert editor.mask is before and editor.is_lifted and editor.view.tool is ToolName.POSE
+
+
+def test_what_is_painted_while_it_is_lifted_is_lifted_with_it(editor: Editor) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    run(editor, "lift")
+    editor.view.tool, editor.view.brush = ToolName.MASK, Brush(6.0, 1.0)
+    ends = editor.view.canvas_from_image(np.array([(20.0, 20.0), (60.0, 20.0)]))
+    stroke(editor, MaskTool(), *ends)
+    wait_for_jobs(editor)
+    assert editor.is_lifted and editor.mask is not None and editor.mask[20, 40]
+    assert editor.chosen.matte is not None and editor.chosen.matte.box[1] < 20
 
 
 def test_an_answer_to_an_old_question_is_dropped(editor: Editor) -> None:

@@ -352,6 +352,7 @@ def test_in_its_own_photo_it_is_as_it_was_copied(editor: Editor, ball: Document)
     editor.tabs.open(ball)
     editor.placing.nudge(5.0, 0.0)
     run(editor, "copy_object")
+    wait_for_jobs(editor)
     editor.placing.nudge(40.0, 0.0)
     run(editor, "decontaminate")
     for count in (2, 3):

@@ -74,6 +74,10 @@ class Wish:
     words: Mapping[str, object] = field(default_factory=dict)  # fields of `LiftSettings`
     other: Path | OtherPhoto | None = None  # a further photo of the object
 
+    def is_before(self, thing: EditObject) -> bool:
+        """Whether the outline of an object that is not lifted yet has changed since."""
+        return thing.lifted is None and thing.mask is not self.mask
+
     def after(self, older: Wish | None) -> Wish:
         """Return both wishes as one, for one step."""
         if older is None or older.mask is not self.mask:

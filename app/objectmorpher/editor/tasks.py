@@ -329,7 +329,11 @@ class Tasks:
             thing = now.objects[k] if now is not None and k < len(now.objects) else None
             is_lifted = thing is not None and thing.lifted is not None
             is_other = thing is not None and is_lifted and not asked.is_of(thing.shape)
-            if is_other and wish.label is not None and self.wishes.get(k) is wish:
+            is_same = self.wishes.get(k) is wish
+            if is_other and wish.label is not None and is_same:
+                self._ask_lift()
+            elif thing is not None and thing.mask is not None and wish.is_before(thing) and is_same:
+                self.wishes[k] = replace(wish, mask=thing.mask)
                 self._ask_lift()
             else:
                 self._end_lift(k, wish)

@@ -93,7 +93,7 @@ class Selection:
         """A point of the photo, image px, that belongs to the object or does not."""
         editor = self._editor
         size = editor.photo_size
-        if size is None or not (0 <= x < size[0] and 0 <= y < size[1]):
+        if size is None or not (0 <= x < size[0] and 0 <= y < size[1]) or self._is_being_lifted():
             return
         question = self._tasks.question if self.pending is not None else None
         before, click = self.prompt, Click(x, y, is_foreground)
@@ -115,18 +115,28 @@ class Selection:
         self, box: tuple[float, float, float, float], combine: Combine = Combine.ANEW
     ) -> None:
         """The object is inside a box x0, y0, x1, y1 image px: a selection made anew, or more."""
-        self._ask(Prompt(box=box), _label(combine), combine)
+        if not self._is_being_lifted():
+            self._ask(Prompt(box=box), _label(combine), combine)
 
     def set_outline(self, outline: np.ndarray, combine: Combine = Combine.ANEW) -> None:
         """Select everything inside a closed line (N, 2), image px."""
         editor = self._editor
-        if editor.document is None or editor.photo_size is None:
+        if editor.document is None or editor.photo_size is None or self._is_being_lifted():
             return
         inside = mask_edit.enclosed(outline, editor.photo_size)
         question = Question(Prompt(), t("Draw around"), editor.current, combine, editor.mask)
         if inside.any():
             editor.jobs.cancel(SELECT)
             self._apply(question, inside, editor.document)
+
+    def _is_being_lifted(self) -> bool:
+        """Whether the object is on its way into 3D: a click then may be meant as a pin already."""
+        editor = self._editor
+        wish = self._tasks.wishes.get(editor.current)
+        is_held = wish is not None and wish.mask is editor.mask and not editor.is_lifted
+        if is_held:
+            editor.say(t("The object is being lifted; its outline can be changed when it is there"))
+        return is_held
 
     def select_subject(self) -> None:
         """The photo's main subject."""
