@@ -52,7 +52,7 @@ from .scripting.options import EditScript, ScriptError
 from .scripting.report import Stopwatch, build_report
 from .scripting.runner import RefineOptions, has_left, prompt_of, with_plate, with_refinement
 from .scripting.script import ALONE, FurtherObject, Others
-from .segment import Found, Segmenter
+from .segment import UNSURE, Found, Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matting.matte import cut_out
 from .splat_files import COUNT
@@ -325,13 +325,16 @@ class _Run:
         self.begins_plate = False  # as soon as the object that is lifted is cut out
         self.ahead: PlateAhead | None = None  # that plate
         self._readings: dict[str, Reading] = {}  # by the segmenter's name
+        self._unsure: dict[int, float] = {}  # how sure a selection is that may be wrong
 
     def add(self, k: int, wanted: FurtherObject, mask: bytes | None, progress: Progress) -> None:
         """Object `k` as far as it can be without the plate; the document may hold it, lifted."""
         script, is_lifted = wanted.script, k < len(self.document.objects)
         if wanted.duplicate is None and not is_lifted:
             with naming(script.mask or "the mask"):
-                self.choose(script, mask, part(progress, 0.0, 0.5))
+                sure = self.choose(script, mask, part(progress, 0.0, 0.5))
+            if sure is not None and sure < UNSURE:
+                self._unsure[k] = sure
         if wanted.stay_in_front:
             self._keep(k)
             return
@@ -409,8 +412,12 @@ class _Run:
             self.document = edits.rename(self.document, k, f"Front {number}")
 
     def doubts(self) -> tuple[str, ...]:
-        """Return the doubts about what stays in front, each a sentence."""
-        found = []
+        """Return the doubts about what is selected, and what stays in front, each a sentence."""
+        found = [
+            f"only {sure:.0%} sure which pixels are {self.document.objects[k].name}: --click "
+            "what is missing, --not-click what is too much, or give a --box around it"
+            for k, sure in self._unsure.items()
+        ]
         for k, item in enumerate(self.document.objects):
             doubt = None
             if item.stays_in_front:

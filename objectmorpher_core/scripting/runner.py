@@ -246,7 +246,9 @@ def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
         if item.is_moved and item.is_visible:
             splats = puppet.posed(item.pose, item.placement)
             trust = trust_in(splats)
-            if trust.sign != SIGNS[0] and _is_in_photo(splats.means, document):
+            if not _is_in_photo(splats.means, document):
+                found.append(f"{item.name} is beside the photo now, where nobody sees it")
+            elif trust.sign != SIGNS[0]:
                 is_moved_only = item.pose is None and not any(item.placement.turn)
                 way = "moved" if is_moved_only else "turned"
                 share = f"the photo does not show {trust.invented:.0%} of what is seen of it now"

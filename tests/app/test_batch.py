@@ -65,10 +65,13 @@ def test_a_failure_does_not_stop_the_others(folder, capsys):
     assert report["edits"][0]["report"]["pixels"]["outside_footprint_changed"] == 0
 
 
-def test_it_makes_what_edit_makes(folder):
-    _script("a.json", {"move": [9, 4]})
+def test_it_makes_and_says_what_edit_does(folder, capsys):
+    _script("a.json", {"turn": [120, 0, 0]})
     assert _batch() == 0
+    said = capsys.readouterr().err.replace(str(Path("out/a.png")), "own.png")
+    assert "own.png: Object 1 is turned so far that it is guesswork" in said
     assert cli.main(["edit", "--script", "scripts/a.json", "-o", "own.png"]) == 0
+    assert capsys.readouterr().err == said
     assert Path("out/a.png").read_bytes() == Path("own.png").read_bytes()
 
 

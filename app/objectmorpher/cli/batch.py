@@ -29,7 +29,7 @@ from objectmorpher_core.scripting.script import (
 from .command_parser import check_ray
 from .commands import check_outputs, edited_by, json_bytes
 from .idle_options import refuse_idle, said_on
-from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
+from .terminal import FAILURES, PROGRAM, UsageError, failure_sentence, progress_bar
 
 USUAL_ENDING = ".png"  # of edits of photos in formats that are only read
 
@@ -193,6 +193,8 @@ def _say(entry: dict[str, Any]) -> None:
     }[entry["state"]]
     sys.stdout.write(f"{entry['state']:<6}  {entry['out']}  {told}\n")
     sys.stdout.flush()
+    for note in (entry.get("report") or {}).get("notes") or ():
+        sys.stderr.write(f"{PROGRAM}: {entry['out']}: {note}\n")
 
 
 def _tasks(options: argparse.Namespace) -> Iterator[Task]:
