@@ -347,8 +347,9 @@ class Result:
     def encode(
         self, ending: str = ".png", what: str = "photo", video: str = "morph", seconds: float = 4.0
     ) -> bytes:
-        """The bytes of a file with that ending; see `save`."""
-        return encode_output(what, self.edited, Path(f"{IN_MEMORY}{ending}"), Clip(video, seconds))
+        """The bytes of a file with that ending, with or without its dot; see `save`."""
+        path = Path(f"{IN_MEMORY}.{ending.removeprefix('.')}")
+        return encode_output(what, self.edited, path, Clip(video, seconds))
 
     def save(
         self, path: File, what: str = "photo", video: str = "morph", seconds: float = 4.0

@@ -9,7 +9,7 @@ from typing import Any
 LONGEST = 60  # characters
 DIGITS = 10_000  # binary ones, beyond which Python does not write a number
 REASON = 200  # characters of a sentence that quotes what a file says
-LIKENESS = 0.6  # of difflib, from which on a word is taken for a misspelt one
+LIKENESS = 0.7  # of difflib, from which on a word is taken for a misspelt one
 
 
 def shown(value: Any) -> str:
@@ -47,5 +47,6 @@ def reason(error: BaseException) -> str:
 
 def meant(word: str, known: Iterable[str]) -> str:
     """`, did you mean edit?`; nothing where no known word is like it."""
-    near = get_close_matches(word, list(known), n=1, cutoff=LIKENESS)
-    return f", did you mean {near[0]}?" if near else ""
+    bare = {name.lstrip("-"): name for name in known}  # or dashes would make all options alike
+    near = get_close_matches(word.lstrip("-"), bare, n=1, cutoff=LIKENESS)
+    return f", did you mean {bare[near[0]]}?" if near else ""

@@ -84,6 +84,8 @@ def _number(key: str, value: Any) -> float:
 
 def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
     def parse(key: str, value: Any) -> tuple[float, ...]:
+        if least == 1 and isinstance(value, int | float):
+            value = [value]
         if not isinstance(value, list | tuple) or not least <= len(value) <= most:
             raise ScriptError(f"{key}: {shown(value)} is not {count_range(least, most)} numbers")
         numbers = tuple(_number(key, v) for v in value)
@@ -181,6 +183,13 @@ def whole(least: int, most: int) -> Callable[[str, Any], int]:
         return value
 
     return parse
+
+
+def _factor(key: str, value: Any) -> float:
+    factor = _number(key, value)
+    if factor <= 0:
+        raise ScriptError(f"{key}: a scale of {factor:g} is not above 0")
+    return factor
 
 
 def _between(least: float, most: float) -> Callable[[str, Any], float]:
@@ -408,7 +417,7 @@ class EditScript:
         "how steeply you look down on it: 0 from its side, 90 from above",
     )  # fmt: skip
     scale: float | None = _option(
-        None, NUMBER, _PLACED, "S", "scale factor, from its foot where it stands"
+        None, Values("number", _factor), _PLACED, "S", "scale factor, from its foot where it stands"
     )
     key: tuple[EditScript, ...] = _option(
         (), KEYS, _WHOLE, "POSE",

@@ -111,9 +111,12 @@ def decode_session(data: bytes) -> Document:
 
 
 def load_session(path: Path) -> Document:
-    """The document of a session file. Raises SessionError, OSError."""
-    with path.open("rb") as file:
-        return read_session(file)
+    """The document of a session file. Raises SessionError, which names the file, and OSError."""
+    try:
+        with path.open("rb") as file:
+            return read_session(file)
+    except SessionError as error:
+        raise SessionError(f"{named(path.name)}: {error}") from error
 
 
 def read_session(file: IO[bytes]) -> Document:

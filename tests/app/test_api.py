@@ -253,6 +253,7 @@ def test_figures_and_pixels_are_plain(folder):
     assert json.loads(json.dumps(result.report))["object"]["gaussians"] > 0
     assert np.array_equal(result.pixels, read_picture(result.encode()).pixels)
     assert (result.pixels != PIXELS).any()
+    assert result.encode("png") == result.encode(".png")
 
 
 WRONG = {
@@ -262,6 +263,7 @@ WRONG = {
     "a field of view": lambda: om.open("photo.png", fov=400),
     "an option": lambda: _edit().options(nose=1),
     "a value": lambda: _edit().scale("large"),  # type: ignore[arg-type]
+    "a scale of nothing": lambda: _edit().scale(0),
     "a mask of numbers": lambda: _edit().mask(np.zeros(MASK.shape)),
     "a mask of another size": lambda: _edit().mask(MASK[:9]).render(),
     "an empty mask": lambda: _edit().mask(np.zeros_like(MASK)).lift(),

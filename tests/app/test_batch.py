@@ -62,6 +62,8 @@ def test_a_failure_does_not_stop_the_others(folder, capsys):
     assert told.err.splitlines()[-1].endswith("2 of 5 edits failed")
     report = json.loads(Path("r.json").read_text())
     assert (report["done"], report["failed"], len(report["edits"])) == (3, 2, 5)
+    outs = [entry["out"] and Path(entry["out"]).name for entry in report["edits"]]
+    assert outs == ["a.png", "b.png", None, "d-1.png", "d-2.png"]
     assert report["edits"][0]["report"]["pixels"]["outside_footprint_changed"] == 0
 
 

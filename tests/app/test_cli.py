@@ -367,7 +367,14 @@ def test_a_batch_of_which_one_fails_writes_none(folder, capsys):
 def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
     wishes = ["--handle", "110,62:120,40", *TURN, "--seed", "4"]
     assert _edit(*wishes, "--session", "s.omorph", "--report", "a.json") == 0
+    capsys.readouterr()
     assert cli.main(["replay", "s.omorph", "-o", "again.png", "--report", "b.json"]) == 0
+    line = r"wrote again\.png, b\.json in \d+\.\d s: \d+% of the photo changed \(.*%.*\)\n"
+    assert re.fullmatch(line, capsys.readouterr().out)
+    for command in (["convert", "s.omorph", "o.ply"], ["share", "s.omorph", "-o", "o.html"]):
+        assert cli.main(command) == 0
+        line = rf"wrote {re.escape(command[-1])} in \d+\.\d s\n"
+        assert re.fullmatch(line, capsys.readouterr().out)
     assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
     a, b = (json.loads(Path(name).read_text()) for name in ("a.json", "b.json"))
     assert a["handles"] == b["handles"]
@@ -413,8 +420,8 @@ def test_a_session_of_an_object_cut_by_the_frame_gives_the_same_bytes(folder):
 
 
 def test_a_session_that_is_none_is_refused(folder, capsys):
-    _expect_failure(["replay", "photo.png", "-o", "out.png"], capsys, "")
-    _expect_failure(["info", "text.jpg"], capsys, "")
+    _expect_failure(["replay", "photo.png", "-o", "out.png"], capsys, "photo.png: the session")
+    _expect_failure(["info", "text.jpg"], capsys, "text.jpg: the session")
 
 
 # ---- what fails, fails in one sentence and changes nothing ----------------------------------

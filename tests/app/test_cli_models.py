@@ -94,9 +94,15 @@ def test_a_gated_model_wants_its_licence_by_name(capsys, server: Hub, monkeypatc
     assert code == 0 and GATED.id in out
 
 
+def test_what_is_only_optional_is_not_missed(capsys) -> None:
+    out = said(capsys, "verify")[1].splitlines()
+    assert "dinov2-vits14: not installed" in out and "depth: not installed (optional)" in out
+
+
 def test_offline_is_one_sentence(capsys, server: Hub) -> None:
-    for id in (FREE.id, "u2netp"):
-        code, _, err = said(capsys, "get", id, "--yes", "--offline")
+    for words in ([FREE.id, "--yes"], ["u2netp", "--yes"], [FREE.id], ["lama"]):
+        code, _, err = said(capsys, "get", *words, "--offline")
+        assert "--yes" not in err
         assert code == 1 and models.OFFLINE in err and err.strip().count("\n") <= 1
 
 

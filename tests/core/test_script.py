@@ -72,6 +72,10 @@ def test_a_move_without_depth_stays_at_its_depth():
     assert script_from({"move": [3, 4]}).move == (3.0, 4.0, 0.0)
 
 
+def test_a_turn_of_one_number_is_a_yaw():
+    assert script_from({"turn": 25}) == script_from({"turn": [25]}) == EditScript(turn=(25, 0, 0))
+
+
 def test_a_handle_without_depth_keeps_its_depth():
     script = script_from({"handle": [{"at": [1, 2], "to": [3, 4]}]})
     assert script.handle == (HandleMove((1.0, 2.0), (3.0, 4.0), 0.0),)
@@ -108,8 +112,9 @@ def test_what_is_no_script_is_refused(text, sentence):
     ("mask", ""), ("mask", 3), ("segment", None), ("gaussians", 99), ("gaussians", 1e5),
     ("gaussians", True), ("handle", [[1, 2]]), ("handle", [{"at": [1, 2]}]),
     ("handle", [{"at": [1, 2], "to": [1, 2], "dx": 1}]), ("move", [1]), ("move", [1, 2, 3, 4]),
-    ("turn", [1, 2, 3, 4]), ("turn", [1, 2, "3"]), ("scale", "2"), ("scale", float("inf")),
-    ("scale", float("nan")), ("deform", "jelly"), ("links", None), ("faithful", "yes"),
+    ("turn", [1, 2, 3, 4]), ("turn", [1, 2, "3"]), ("turn", "25"), ("turn", True),
+    ("scale", "2"), ("scale", 0), ("scale", float("inf")), ("scale", float("nan")),
+    ("deform", "jelly"), ("links", None), ("faithful", "yes"),
     ("nodes", 3), ("nodes", 5000), ("nodes", 1.5), ("stiffness", 9),
     ("fill-from", [[1, 2]]), ("fill-from", [{"source": [1, 2]}]),
     ("fill-from", [{"source": [1, 2], "to": [3, 4], "radius": 0}]),

@@ -42,12 +42,6 @@ class Task:
     item: BatchItem | None
     problem: str = ""
 
-    @property
-    def name(self) -> str:
-        """Return the name that begins its line."""
-        out = None if self.item is None else self.item.out
-        return str(self.script) if out is None else str(Path(out))
-
 
 def run_batch(options: argparse.Namespace) -> None:
     """`objectmorpher batch`. Raises RuntimeError at the end where an edit has failed."""
@@ -134,7 +128,8 @@ def _made_there(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def _told(task: Task) -> dict[str, Any]:
-    return {"script": str(task.script), "out": task.name}
+    out = None if task.item is None else task.item.out
+    return {"script": str(task.script), "out": None if out is None else str(Path(out))}
 
 
 def _known(task: Task, is_overwriting: bool) -> dict[str, Any] | None:
@@ -191,7 +186,7 @@ def _say(entry: dict[str, Any]) -> None:
         "kept": "newer than its script and photo",
         "failed": entry.get("error", ""),
     }[entry["state"]]
-    sys.stdout.write(f"{entry['state']:<6}  {entry['out']}  {told}\n")
+    sys.stdout.write(f"{entry['state']:<6}  {entry['out'] or entry['script']}  {told}\n")
     sys.stdout.flush()
     for note in (entry.get("report") or {}).get("notes") or ():
         sys.stderr.write(f"{PROGRAM}: {entry['out']}: {note}\n")

@@ -98,6 +98,10 @@ class Parser(argparse.ArgumentParser):
         if wrong is not None:
             known = wrong[2].replace("'", "")
             return f"there is no {wrong[1]!r} here{meant(wrong[1], known.split(', '))}: {known}"
+        number = re.search(r"invalid (float|int) value: (.*)", message, re.S)
+        if number is not None:
+            kind = "number" if number[1] == "float" else "whole number"
+            return f"{message[: number.start()]}{number[2]} is not a {kind}"
         missing = message.removeprefix("the following arguments are required: ")
         if missing == message:
             return message
@@ -117,14 +121,15 @@ class Parser(argparse.ArgumentParser):
 
     def parse_args(self, args: Sequence[str], namespace: Any = None) -> argparse.Namespace:  # type: ignore[override]
         """Parse a command line; an unknown option is reported with the one probably meant."""
+        if "-" in args:
+            self.error("- is no file name, and nothing is read from or written to a pipe")
         options, rest = self.parse_known_args(list(args), namespace)
         if rest:
             parser = self._chosen(options)
-            known = [o for a in parser._actions for o in a.option_strings]
             command = parser.prog.partition(" ")[2] or PROGRAM
             word = next((w for w in rest if w.startswith("-")), rest[0]).partition("=")[0]
             what = "has no option" if word.startswith("-") else "cannot do anything with"
-            self.error(f"{command} {what} {word}{meant(word, known)}")
+            self.error(f"{command} {what} {word}{_meant_option(word, parser)}")
         return options
 
     def _chosen(self, options: argparse.Namespace) -> argparse.ArgumentParser:
@@ -138,6 +143,17 @@ class Parser(argparse.ArgumentParser):
             if below is None or name is None:
                 return parser
             parser = below.choices[name]
+
+
+def _meant_option(word: str, parser: argparse.ArgumentParser) -> str:
+    """`, did you mean --handle?`: the one whose help begins so, that is like it, or begins it."""
+    options = [action for action in parser._actions if action.option_strings]
+    known = [name for option in options for name in option.option_strings]
+    verbs = {f"--{(o.help or '').partition(' ')[0]}": o.option_strings[-1] for o in options}
+    begun = [name for name in known if word.startswith(name)]
+    like = meant(word, known)
+    name = verbs.get(word) or next(iter(begun if not like else ()), None)
+    return f", did you mean {name}?" if name else like
 
 
 def has_colour(stream: Any) -> bool:

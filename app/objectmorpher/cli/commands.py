@@ -140,7 +140,7 @@ def run_edit(options: argparse.Namespace) -> None:
         lines.append(line)
     write_all(outputs)
     sys.stderr.write("".join(f"{PROGRAM}: {note}\n" for note in notes))
-    sys.stdout.write("".join(f"{line}\n" for line in lines))
+    sys.stdout.write("".join(lines))
 
 
 def _compile_beside() -> None:
@@ -175,10 +175,14 @@ def _edit_one(
             outputs[extras["report"]] = json_bytes(edited.report())
     for note in edited.notes:
         sys.stderr.write(f"{PROGRAM}: {out}: {note}\n")
-    names = ", ".join(map(str, (out, *extras.values())))
-    seconds = edited.stopwatch.read()["total"]
     told = provenance(edited.composite) + taken_for(edited.document)
-    return outputs, f"wrote {names} in {seconds:.1f} s: {told}"
+    return outputs, _wrote((out, *extras.values()), edited.stopwatch, told)
+
+
+def _wrote(files: Iterable[Path], stopwatch: Stopwatch, told: str = "") -> str:
+    """The line about files that were written, and what is `told` of them."""
+    names, seconds = ", ".join(map(str, files)), stopwatch.read()["total"]
+    return f"wrote {names} in {seconds:.1f} s{told and f': {told}'}\n"
 
 
 def _is_folder(name: str, path: Path) -> bool:
@@ -227,7 +231,7 @@ def run_select(options: argparse.Namespace) -> None:
     mask = _mask(document)
     write_all({options.out: encode_mask(mask)})
     told = f"{_percent(mask)} of the photo selected{_how_sure(*sureness)}"
-    sys.stdout.write(f"wrote {options.out} in {stopwatch.read()['total']:.1f} s: {told}\n")
+    sys.stdout.write(_wrote((options.out,), stopwatch, told))
 
 
 def _percent(mask: Mask) -> str:
@@ -265,7 +269,9 @@ def run_replay(options: argparse.Namespace) -> None:
         wanted[video] = _endings("video")
     inputs = [options.session, *([options.handles] if options.handles else [])]
     check_outputs(inputs, wanted)
-    _check_distinct(path for path in (*(path for path, _, _ in further), video) if path)
+    files = [path for path in (*(path for path, _, _ in further), video) if path]
+    _check_distinct(files)
+    stopwatch = Stopwatch()
     with progress_bar("Opening") as progress:
         document = load_session(options.session)
         if options.handles:
@@ -274,6 +280,7 @@ def run_replay(options: argparse.Namespace) -> None:
         outputs = _encoded("save_video", edited, video, clip) if video else {}
         outputs |= {path: encode(edited) for path, _, encode in further if path}
     write_all(outputs)
+    sys.stdout.write(_wrote(files, stopwatch, provenance(edited.composite)))
 
 
 def run_info(options: argparse.Namespace) -> None:
@@ -337,6 +344,7 @@ def run_convert(options: argparse.Namespace) -> None:
     source, out = options.source, options.out
     check_outputs([source], {out: (*SPLAT_ENDINGS, *OUTPUTS["mesh"])})
     is_mesh = out.suffix.lower() in OUTPUTS["mesh"]
+    stopwatch = Stopwatch()
     with progress_bar("Converting") as progress:
         if source.suffix.lower() in OUTPUTS["session"]:
             data = _object_of(source, "mesh" if is_mesh else "splats", out, progress)
@@ -345,6 +353,7 @@ def run_convert(options: argparse.Namespace) -> None:
             progress(0.7, "Writing")
             data = plain_glb(gaussians) if is_mesh else encode_splats(gaussians, out)
     write_all({out: data})
+    sys.stdout.write(_wrote((out,), stopwatch))
 
 
 def _object_of(session: Path, what: str, out: Path, progress: Progress) -> bytes:
@@ -455,12 +464,14 @@ def run_share(options: argparse.Namespace) -> None:
     from ..server.share_page import encode_page
 
     check_outputs([options.session], {options.out: (".html",)})
+    stopwatch = Stopwatch()
     with progress_bar("Reading") as progress:
         document = load_session(options.session)
         index = object_to_share(document, options.object)
         progress(0.3, "Writing")
         page = encode_page(document, index)
     write_all({options.out: page})
+    sys.stdout.write(_wrote((options.out,), stopwatch))
 
 
 def object_to_share(document: Document, number: int | None) -> int:

@@ -11,6 +11,7 @@ from pathlib import Path
 from objectmorpher_core import lift, model_sets, models
 from objectmorpher_core.lift.workers import file as worker_file
 from objectmorpher_core.models import Added, CacheState, HubModel, HubState
+from objectmorpher_core.models.fetch import check_online
 
 from .idle_options import refuse_idle, said_on
 from .terminal import UsageError, progress_bar
@@ -156,6 +157,8 @@ def _ask(wanted: Sequence[HubModel], is_agreed: bool) -> None:
 
 def _consent(told: str, id: str, is_agreed: bool, verb: str = "download") -> None:
     """The user's consent to what is asked. Raises UsageError without it."""
+    if verb == "download":
+        check_online(id)
     if is_agreed:
         sys.stderr.write(f"{told}\n")
         return
@@ -190,13 +193,14 @@ def _look(action: str, id: str | None) -> None:
     broken = []
     for found in (*states, *brought, *several):
         name = _name_of(found)
-        if action == "verify":
-            reason = getattr(found, "reason", "")  # why it is damaged
-            _write(f"{name}: {found.state}{f' ({reason})' if reason else ''}")
-        elif found.state == "ok":
-            _write(str(found.path))
         # What only a user can bring is not missed, unless it is asked for.
         is_optional = isinstance(found, Added) and found.state == "missing" and not id
+        if action == "verify":
+            state = THERE["missing"] if found.state == "missing" else found.state
+            reason = "optional" if is_optional else getattr(found, "reason", "")
+            _write(f"{name}: {state}{f' ({reason})' if reason else ''}")
+        elif found.state == "ok":
+            _write(str(found.path))
         broken += [name] if found.state != "ok" and not is_optional else []
     if broken:
         raise UsageError(f"{', '.join(broken)}: not installed or damaged, see `models list`")

@@ -100,7 +100,7 @@ def window_parser() -> argparse.ArgumentParser:
     add("--renderer", choices=RENDERERS, default="auto", help="gl draws on the GPU, tiles does not")
     add("--theme", choices=("dark", "light"), help="for this run; default as in the preferences")
     add("--scale", type=float, metavar="S", help="pixels per point")
-    add("--size", type=_list(2, 2), metavar="W,H", default=(1440.0, 900.0), help="points")
+    add("--size", type=_list(2, 2, "W,H"), metavar="W,H", default=(1440.0, 900.0), help="points")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
     add("--seed", type=int, default=0, help="of everything random")
     add(
@@ -172,9 +172,10 @@ def _add_options(parser: argparse.ArgumentParser, *headings: str) -> None:
 
 def _reading(option: Option) -> dict[str, Any]:
     """Return how argparse reads the values of an option. One that is not given is None."""
-    several = {"points": _list(2, 2), "handles": _handle, "sources": _fill_from, "keys": _key,
+    form = option.placeholder or ""
+    several = {"points": _list(2, 2, form), "handles": _handle, "sources": _fill_from, "keys": _key,
                "views": _more_view}  # fmt: skip
-    one = {"number": float, "whole": int, "numbers": _list(*option.values.counts)}
+    one = {"number": float, "whole": int, "numbers": _list(*option.values.counts, form)}
     kind = option.values.kind
     if kind == "flag":
         return {"action": "store_true", "default": None}
@@ -368,15 +369,17 @@ def _joined_negatives(arguments: Sequence[str]) -> list[str]:
     return joined
 
 
-def _list(least: int, most: int) -> Callable[[str], tuple[float, ...]]:
+def _list(least: int, most: int, form: str = "") -> Callable[[str], tuple[float, ...]]:
+    count = "a number" if most == 1 else f"{count_range(least, most)} numbers with commas"
+
     def parse(text: str) -> tuple[float, ...]:
         try:
             numbers = tuple(float(word) for word in text.split(","))
         except ValueError:
             numbers = ()
         if not least <= len(numbers) <= most:
-            count = count_range(least, most)
-            raise argparse.ArgumentTypeError(f"{text!r} is not {count} numbers with commas")
+            told = f"{text!r} is not {count}{form and f', as in {form}'}"
+            raise argparse.ArgumentTypeError(told)
         return numbers
 
     return parse

@@ -135,8 +135,10 @@ def _run_web(options: argparse.Namespace) -> None:
 
 
 def _check_address(options: argparse.Namespace) -> None:
-    if options.max_body < 1 or not 0 <= options.port < 65536 or not 0 < options.cpus < math.inf:
-        raise UsageError("--max-body and --cpus are numbers above zero, --port is below 65536")
+    if not 0 <= options.port < 65536:
+        raise UsageError(f"--port is a number from 0 to 65535, not {options.port}")
+    if options.max_body < 1 or not 0 < options.cpus < math.inf:
+        raise UsageError("--max-body and --cpus are numbers above zero")
 
 
 @contextmanager

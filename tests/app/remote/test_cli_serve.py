@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[3]
         (("--replicas", "3,1"), "smaller first"),
         (("--replicas", "0"), "1 to 256"),
         (("--replicas", "many"), "MIN or MIN,MAX"),
-        (("--port", "99999"), "numbers above zero"),
+        (("--port", "99999"), "objectmorpher: --port is a number from 0 to 65535, not 99999\n"),
         (("--max-body", "0"), "numbers above zero"),
         (("--cpus", "nan"), "numbers above zero"),
         (("--gpus", "-1"), "number of GPUs"),
