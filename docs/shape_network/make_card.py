@@ -148,7 +148,11 @@ things. A thing counts as flat from log odds of {FLAT:g}. How it is trained furt
 240 of the prints, 120 of the round things with pictures and 250 of the solids, while it was not yet
 trained on these, and on 79 objects: the photos and solids of [lifting](../lifting/README.md), and
 43 other photographs. None of the 79 is recognised as another kind than before. What is missed is
-mostly seen edge-on, cut by the frame, or bent."""
+mostly seen edge-on, cut by the frame, or bent.
+
+Of four times as many made later, 336 of 384 prints are taken for flat, and 7 of 256 round things
+with pictures and 2 of 314 other solids. Trained further on three times as many things, 3,456 photos
+of prints among 8,500, it takes 315, 3 and 2: more careful, and for as few mistakes no better."""
 
 
 def _means(told: dict[str, Any]) -> str:

@@ -290,8 +290,8 @@ def _boxes(values: F32, sigma: float, across: int, down: int) -> F32:
             )
             for n in (narrow, wide)
         )
-        values = cv2.addWeighted(less, 1 - share, more, share, 0)
-    return np.asarray(values, np.float32)
+        values = np.asarray(cv2.addWeighted(less, 1 - share, more, share, 0), np.float32)
+    return values
 
 
 def _spread(points: F64, values: F64, grid: SilhouetteGrid, camera: Camera) -> tuple[F32, F32]:
