@@ -324,7 +324,7 @@ class Tasks:
             self._end_lift(k, wish)
 
         def drop() -> None:
-            """It cannot be had; of a shape that was undone meanwhile it is asked for anew."""
+            """It cannot be had; where shape or outline have changed since it is asked for anew."""
             now = editor.committed
             thing = now.objects[k] if now is not None and k < len(now.objects) else None
             is_lifted = thing is not None and thing.lifted is not None
