@@ -227,7 +227,7 @@ def test_what_only_evaluation_needs_is_not_missed_and_not_got_unasked(capsys, mo
     lines = {line.split()[0]: line for line in out.splitlines()}
     assert code == 0 and "58.9 MB" in lines["hed-vgg"] and "not installed" in lines["hed-vgg"]
     code, out, err = said("verify")
-    assert code == 1 and "hed-vgg" not in out + err and "dinov2-vits14: missing" in out
+    assert code == 1 and "hed-vgg" not in out + err and "dinov2-vits14: not installed" in out
     monkeypatch.setenv(models.OFFLINE, "1")
     for id in ("hed-vgg", "lpips-alex"):
         code, _, err = said("get", id)
