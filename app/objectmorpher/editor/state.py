@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from ..worker.jobs import Jobs
 from ..worker.requests import LIFT, READY, Chores, JobError
 from .autosave import Autosave
 from .export_plan import What
-from .history import History, Step
+from .history import CLOCK, History, Step
 from .settings import Settings
 from .view import CHANGING, MOVING, Action, ComposeView, Hover, StatusMessage, ViewState
 
@@ -63,6 +63,57 @@ class Answers:
         for take in waiting:
             take()
         return True
+
+
+class LabelledChange(Protocol):
+    """A change that becomes a step."""
+
+    @property
+    def label(self) -> str: ...
+
+
+C = TypeVar("C", bound=LabelledChange)
+
+
+class WaitingChanges(Generic[C]):
+    """Changes that become steps one after the other; a job makes the first one."""
+
+    kind = ""  # of these jobs
+
+    def __init__(self, editor: EditorState) -> None:
+        self._editor = editor
+        self._waiting: list[C] = []
+        self.newest = 0  # number of the last one, as of the history's steps
+
+    def forget(self) -> None:
+        """Drop them all, such as those of another document."""
+        self._waiting.clear()
+
+    @property
+    def undo_label(self) -> str | None:
+        """Of the last one, which is not made yet; None: there is none."""
+        return self._waiting[-1].label if self._waiting else None
+
+    def take_back(self) -> None:
+        """Forget the last one."""
+        self._waiting.pop()
+        if not self._waiting:
+            self._editor.jobs.cancel(self.kind)
+
+    def _add(self, change: C) -> bool:
+        """It is made after the others; whether it is the only one."""
+        self._waiting.append(change)
+        self.newest = next(CLOCK)
+        return len(self._waiting) == 1
+
+    def _is_first(self, change: C) -> bool:
+        """Whether it is the one that is being made: it was not taken back."""
+        return bool(self._waiting) and self._waiting[0] is change
+
+    def _end_first(self) -> None:
+        """It is a step now, and the others come after that."""
+        self._waiting.pop(0)
+        self.newest = next(CLOCK)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,10 +28,11 @@ FLAT_SOLID = 0.5  # alpha from which on a pixel belongs to the object
 
 
 def coarsely_smooth(values: F32, sigma: float) -> F32:
-    """Three boxes of whole px, up to half a px wider than `sigma`: what is tried is as fine.
+    """Three boxes of whole px: a blur by up to half a px more than `sigma`.
 
-    Shadows were scored so. By boxes of any width as many are found, their forms as near (overlap
-    .38), but the saucer's in the gallery is taken for a shorter one than it throws.
+    The scores of a photo's shadows were chosen with it. With exact blurs about as many are found,
+    and their forms are as near to the true ones (overlap 0.38), but the shadow of the gallery's
+    saucer is taken for a shorter one than it is.
     """
     size = 2 * round(sigma) + 1
     for _ in range(3):

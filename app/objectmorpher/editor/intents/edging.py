@@ -20,14 +20,13 @@ from ...system.texts import t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
-from ..history import CLOCK
+from ..state import WaitingChanges
 
 if TYPE_CHECKING:
     from ..state import EditorState
     from .landing import Landing
     from .masking import Masking
 
-BRUSH_EDGE = "brush edge"  # kind of job
 USUAL = 1.0  # amount of what one press of Decontaminate takes out
 
 
@@ -46,23 +45,23 @@ class EdgeWish:
         return t("Erase edge brush") if self.is_erasing else t("Edge brush")
 
 
-class Edging:
+class Edging(WaitingChanges[EdgeWish]):
     """The current object's soft edge."""
 
+    kind = "brush edge"
+
     def __init__(self, editor: EditorState, landing: Landing, masking: Masking) -> None:
-        self._editor = editor
+        super().__init__(editor)
         self._landing, self._masking = landing, masking
         self.stroke: Stroke | None = None  # in progress
         self.is_erasing = False
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
-        self._waiting: list[EdgeWish] = []  # the first one is being done
-        self.newest = 0  # number of the last one, as of the history's steps
         self._spill: tuple[F32, F32] | None = None  # of which colours, and what is in them
 
     def forget(self) -> None:
         """Another document is opened."""
+        super().forget()
         self.stroke, self._spill = None, None
-        self._waiting.clear()
 
     # The brush
 
@@ -97,23 +96,8 @@ class Edging:
         if stroke is None or document is None:
             return
         painted = stroke.coverage >= 0.5
-        self._waiting.append(
-            EdgeWish(document.photo, self._editor.current, painted, self.is_erasing)
-        )
-        self.newest = next(CLOCK)
-        if len(self._waiting) == 1:
+        if self._add(EdgeWish(document.photo, self._editor.current, painted, self.is_erasing)):
             self._do_next()
-
-    @property
-    def undo_label(self) -> str | None:
-        """Of the last stroke whose edge is not found yet; None: there is none."""
-        return self._waiting[-1].label if self._waiting else None
-
-    def take_back(self) -> None:
-        """Forget that stroke."""
-        self._waiting.pop()
-        if not self._waiting:
-            self._editor.jobs.cancel(BRUSH_EDGE)
 
     def _do_next(self) -> None:
         from objectmorpher_core.segment.matting.repair import EdgeStroke
@@ -125,19 +109,15 @@ class Edging:
             self._waiting.clear()
             return
 
-        def is_next() -> bool:
-            return bool(self._waiting) and self._waiting[0] is wish
-
         def accept(answer: tuple[U8, Mask]) -> None:
-            if not is_next():  # it was taken back
+            if not self._is_first(wish):
                 return
             now = self._thing_of(wish)
             if now is None or now.selection is not thing.selection:
                 self._waiting.clear()
                 return
             self._take(wish, *answer)
-            self._waiting.pop(0)
-            self.newest = next(CLOCK)
+            self._end_first()
             self._do_next()
 
         def fail(error: JobError) -> None:
@@ -148,8 +128,8 @@ class Edging:
             t("Looking for the edge"), job_functions.brush_edge,
             EdgeStroke(wish.photo.pixels, thing.selection, thing.mixed, wish.painted),
             wish.is_erasing, done=lambda answer: editor.answers.take(lambda: accept(answer)),
-            failed=fail, cancelled=lambda: self._waiting.clear() if is_next() else None,
-            kind=BRUSH_EDGE,
+            failed=fail, cancelled=lambda: self._waiting.clear() if self._is_first(wish) else None,
+            kind=self.kind,
         )  # fmt: skip
 
     def _thing_of(self, wish: EdgeWish) -> EditObject | None:

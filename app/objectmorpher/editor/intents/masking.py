@@ -26,7 +26,7 @@ from ...system.texts import folder_of, t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.requests import JobError
-from ..history import CLOCK
+from ..state import WaitingChanges
 from ..tasks import READ_MASK, SELECT, WRITE
 from ..view import Action, ToolName
 from .composing import on_canvas, tint
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from ..state import EditorState
     from .landing import Landing
     from .posing import Posing
-
-CHANGE = "change mask"  # kind of job
 
 
 @dataclass(frozen=True)
@@ -47,18 +45,18 @@ class MaskChange:
     function: Callable[[Selection], Selection]
 
 
-class Masking:
+class Masking(WaitingChanges[MaskChange]):
     """The current object's mask, as something to work on."""
 
+    kind = "change mask"
+
     def __init__(self, editor: EditorState, landing: Landing, posing: Posing) -> None:
-        self._editor = editor
+        super().__init__(editor)
         self._landing, self._posing, self.mirroring = landing, posing, posing.mirroring
         self.painting: MaskPainting | None = None  # the stroke in progress
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
         self._veil: tuple[tuple[object, ...], CanvasLayer] | None = None  # of what it was made
-        self._waiting: list[MaskChange] = []  # the first one is being made
-        self.newest = 0  # number of the last one, as of the history's steps
 
     @property
     def shown(self) -> Selection | None:
@@ -168,21 +166,8 @@ class Masking:
 
     def _enqueue(self, change: MaskChange) -> None:
         """One after the other: three presses grow the selection three times."""
-        self._waiting.append(change)
-        self.newest = next(CLOCK)
-        if len(self._waiting) == 1:
+        if self._add(change):
             self._make_next()
-
-    @property
-    def undo_label(self) -> str | None:
-        """Of the last change that is not made yet; None: there is none."""
-        return self._waiting[-1].label if self._waiting else None
-
-    def take_back(self) -> None:
-        """Forget that change."""
-        self._waiting.pop()
-        if not self._waiting:
-            self._editor.jobs.cancel(CHANGE)
 
     def _make_next(self) -> None:
         editor, thing = self._editor, self._editor.object
@@ -193,19 +178,15 @@ class Masking:
             return
         change, k = self._waiting[0], editor.current
 
-        def is_next() -> bool:
-            return bool(self._waiting) and self._waiting[0] is change
-
         def accept(changed: Selection) -> None:
-            if not is_next():  # it was taken back
+            if not self._is_first(change):
                 return
             now = editor.object.selection if editor.object else None
             if now is not thing.selection or editor.current != k:
                 self.forget()
                 return
             self._apply(change.label, changed)
-            self._waiting.pop(0)
-            self.newest = next(CLOCK)
+            self._end_first()
             self._make_next()
 
         editor.jobs.start(
@@ -213,12 +194,8 @@ class Masking:
             thing.selection, change.function,
             done=lambda changed: editor.answers.take(lambda: accept(changed)),
             failed=lambda error: self._fail(error, change),
-            cancelled=lambda: self.forget() if is_next() else None, kind=CHANGE,
+            cancelled=lambda: self.forget() if self._is_first(change) else None, kind=self.kind,
         )  # fmt: skip
-
-    def forget(self) -> None:
-        """Drop the changes that wait, such as those of another document."""
-        self._waiting.clear()
 
     def _fail(self, error: JobError, change: MaskChange) -> None:
         self.forget()
