@@ -84,7 +84,7 @@ class NotServed(Exception):
 
 
 class TooMuch(Exception):
-    """The server takes smaller requests only, and is there all the same; one sentence."""
+    """The server is there, but takes smaller requests only; says so in one sentence."""
 
 
 class ServedError(ValueError):

@@ -42,8 +42,8 @@ def call(server: Server, name: str, arguments: tuple[Any, ...], progress: Progre
     """The answer of the job function `name`.
 
     Raises ServerLost where the server gave none, NotServed where it never will, TooMuch where it
-    would to less, ServedError where the job failed, and Cancelled out of `progress`, which ends
-    the job over there, too.
+    takes smaller requests only, ServedError where the job failed, and Cancelled out of `progress`,
+    which ends the job over there, too.
     """
     served = table()[name]
     message = encode(arguments, types(), is_split=True)

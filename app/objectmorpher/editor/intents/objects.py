@@ -155,11 +155,8 @@ class Objects:
         if editor.object.is_locked:
             editor.say_locked(k)
             return
-        for job in (
-            SELECT,
-            LIFT,
-            READ_MASK,
-        ):  # what they would bring is for an object by its number
+        # What these would bring is for an object by its number.
+        for job in (SELECT, LIFT, READ_MASK):
             editor.jobs.cancel(job)
         left = edits.remove_object(document, k)
         editor.apply(t("Remove object"), left)

@@ -368,8 +368,9 @@ def number_field(number: Number, value: float) -> FieldChange:
 
 def _select_all_of_double_clicked() -> None:
     """A double-click selects the number that is typed over, not what is behind its point."""
-    typed = imgui.internal.get_input_text_state(imgui.get_item_id())
-    if typed is not None and imgui.is_item_active() and imgui.is_mouse_double_clicked(0):
+    if not (imgui.is_mouse_double_clicked(0) and imgui.is_item_active()):
+        return
+    if (typed := imgui.internal.get_input_text_state(imgui.get_item_id())) is not None:
         typed.select_all()
         typed.selected_all_mouse_lock = True  # until the button is let go
 
