@@ -180,5 +180,5 @@ def placed_values(editor: Editor, p: Placement) -> tuple[float, ...]:
     """
     home = editor.placing.home
     right, down = p.move[0] - home.move[0], p.move[1] - home.move[1]
-    turn, size = editor.placing.angles, 100 * p.scale / home.scale
+    turn, size = editor.placing.angles, 100 * (p.scale / home.scale)
     return right, down, p.depth - home.depth, *turn, size
