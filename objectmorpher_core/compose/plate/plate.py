@@ -46,6 +46,7 @@ COARSE = 4.0  # px of hole margin at which the correction is computed
 SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
 NO_SHADE = 0.6  # tint, from which what is darker is no shadow; see `residue.Ghost`
 FAINT = 0.1  # of the logarithm of a fill: what is beside it by so little darker is no shadow
+DEEPEST = 0.4  # gain: what is darker yet is the unlit place below a thing, and goes with it
 UNSEEN = 0.995  # gain, from which nothing is seen of it
 TRUE = 0.05  # share of the fill in a coarse pixel that is still the photo's
 CONTEXT = 1.0  # x the hole's longer side, kept around it for the inpainter to copy from
@@ -317,7 +318,7 @@ def _in_shade(plate: Plate, photo: Pixels, still: tuple[Matte, ...], margin: flo
     darker = np.minimum(beside - usual + FAINT, 0)
     is_shade = np.clip((NO_SHADE - tint_of(darker)) / (NO_SHADE - TINTED), 0, 1)
     share = np.minimum(2 * near, 1) * is_shade * (own > 0)
-    gain = np.exp(darker * share[..., None])
+    gain = np.exp(np.maximum(darker, np.log(np.float32(DEEPEST))) * share[..., None])
     if gain.min() >= UNSEEN:
         return plate
     pixels = plate.pixels.copy()

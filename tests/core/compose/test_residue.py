@@ -284,6 +284,7 @@ def test_what_a_turn_uncovers_lies_in_the_shadow_that_is_left_beside_it():
     turned, away = Placement(turn=(60.0, 0.0, 0.0)), Placement(move=(-200.0, 0.0))
     assert shown(0.25 * behind, turned) < 0.5
     assert shown(0.25 * behind, away) > 0.9
+    assert shown(0.02 * behind, turned) > 0.3, "no shadow: so dark it is below a thing only"
     assert shown(np.array([120.0, 0.0, 10.0]), turned) > 0.9, "of another colour: no shadow"
 
 
