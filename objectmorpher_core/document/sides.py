@@ -10,6 +10,8 @@ from ..base.arrays import F32, F64, U8, Mask, freeze
 from ..base.camera import Camera
 
 MOST_MATCHES = 20_000  # between two photos
+# Visibility of what something else hides that the photo shows; painted, it has less (`paint`).
+HIDDEN = np.float32(1e-5)
 INSIDE = 128  # of 255: from this alpha on a pixel shows the object
 
 
@@ -18,7 +20,8 @@ class Sides:
     """Invented pictures of the sides that a photo does not show, and where each Gaussian looks.
 
     A Gaussian takes what it shows from there once it faces the camera so much more than it faced
-    the photo's that the photo would be stretched over it (`raster.rules`).
+    the photo's that the photo would be stretched over it (`raster.rules`), and always where another
+    part of the object stands before it in the photo.
     """
 
     pixels: U8  # (h, w, 3) sRGB

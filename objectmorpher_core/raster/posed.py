@@ -13,6 +13,7 @@ from ..base.camera import Camera
 from ..deform.binding import LANES
 from ..deform.skinning import Skin, Skinned
 from ..document.model import LiftedObject
+from ..document.sides import HIDDEN
 from .rules import SPLATTINGS, Splatting
 
 SURFACE_GAP = 5.0  # x spacing: samples farther apart in depth are different surfaces
@@ -151,9 +152,17 @@ class RestSplats:
 
     @cached_property
     def cosines(self) -> F64:
-        """(N,) of the normal with the direction to the camera."""
+        """(N,) of the normal with the direction to the camera.
+
+        What something else hides, and a picture shows, is as if it faced away: it never shows the
+        photo, which has something else there.
+        """
         world = self.lifted.world_points(self.means)
-        return frozen(-(self.normals * world).sum(1) / np.linalg.norm(world, axis=1))
+        found = -(self.normals * world).sum(1) / np.linalg.norm(world, axis=1)
+        if self.sides is not None:
+            seen = self.lifted.texture.visibility
+            found[(self.sides.zoom != 0) & np.isclose(seen, HIDDEN, atol=0)] = -1.0
+        return frozen(found)
 
     @cached_property
     def side_blocks(self) -> F32:

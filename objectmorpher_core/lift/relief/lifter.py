@@ -22,6 +22,7 @@ from ...base.rotations import quats_along
 from ...deform.control_points import COUNT, sample_control_points
 from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings, Matte, PhotoTexture
+from ...document.sides import HIDDEN
 from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
 from ..shapes import (
@@ -50,6 +51,7 @@ from .sides import with_sides
 from .silhouette import ReliefSilhouette, solid_part
 from .spreading import SurfacePoints, spread
 from .strands import with_strands
+from .uncovered import with_uncovered
 
 TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
@@ -60,7 +62,6 @@ LEAST_AREA = 25  # px
 SEAM = 2.0  # x mean spacing: so near to what was hidden nothing of the photo is carried
 NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of the photo
 NEARNESS_EPS = 1e-3  # variance of colours in [0, 1] that counts as flat
-HIDDEN = 1e-6  # visibility of what faces the photo's camera and something else hides
 PROFILE = 1.2  # width over height, from which what stands is thought to be seen from the side
 
 Shaper = Callable[[ReliefSilhouette, Camera, LiftSettings, MirrorAxis | None], ReliefBody]
@@ -128,7 +129,7 @@ class ReliefLifter:
         if settings.views:
             return with_views(lifted, matte, camera, settings.views, seed, invents)
         if not invents:
-            return lifted
+            return with_uncovered(lifted, surface, spacing, body, matte, camera)
         return with_strands(with_sides(lifted, matte, camera, seed), matte, camera, seed)
 
     def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:

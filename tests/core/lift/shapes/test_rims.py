@@ -7,19 +7,28 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from skimage import data
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import turn_matrix
+from objectmorpher_core.compose import load
+from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose.plate.plate import build_plate
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Placement, Prompt
 from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.spreading import spread
 from objectmorpher_core.lift.shapes import closed_ring, completed, laid, rims_of
 from objectmorpher_core.lift.shapes.rims import Rim, at_edge
 from objectmorpher_core.lift.shapes.solids import Mesh, RayGrid, drawn, ellipsoid, revolved, tube
+from objectmorpher_core.pipeline import lift_mask, open_photo
 from objectmorpher_core.segment.matting.matte import cut_out
 from objectmorpher_research.training.shape_eval import score, surfaces_of
 from tests.core.lift.shapes.test_recognition import AT, as_far, body_of, see
+from tests.core.segment.truth_masks import truth_mask
+from tests.shapes import png
 
 UP = -turn_matrix(0, 45, 6)[:, 1]  # of a table, seen from above
 DEGREE = np.cos(np.radians(1.0))
@@ -172,6 +181,24 @@ def test_lips_are_no_half_pixel_beside_their_edges(cup_on_saucer) -> None:
             ends = [rim.centre[:2] / rim.centre[2] * camera.focal for rim in (found, true)]
             shifts.append(ends[0] - ends[1])
     assert np.abs(np.mean(shifts, 0)).max() < 0.3  # px
+
+
+def test_what_stands_beside_a_cup_is_whole_where_both_have_moved() -> None:
+    """On a photo: the cup's handle and the spoon reach over the line where cup and saucer meet."""
+    photo, mask = open_photo(png(data.coffee()), "coffee.png"), truth_mask("coffee")
+    document = edits.set_mask(edits.add_object(photo), 0, mask, Prompt())
+    pixels, camera = photo.photo.pixels, photo.photo.camera
+    document = edits.set_lifted(document, 0, *lift_mask(pixels, camera, mask, "relief"))
+    document = edits.set_plate(document, build_plate(pixels, mask, load("telea")))
+    moved = edits.set_placement(document, 0, Placement(move=(-8.0, -5.0)))
+    shown, true = composite(moved).pixels.astype(np.float32), pixels.astype(np.float32)
+    # It is not as far away everywhere: each place is looked for some px around where it came.
+    shifts = [(5 + dy, 8 + dx) for dy in range(-3, 4) for dx in range(-5, 6)]
+    off = np.min(
+        [cv2.blur(np.abs(np.roll(shown, s, (0, 1)) - true).mean(-1), (5, 5)) for s in shifts], 0
+    )
+    inner = cv2.erode(mask.astype(np.uint8), np.ones((13, 13), np.uint8)) > 0
+    assert (off[inner] > 18).mean() < 0.007
 
 
 def test_an_egg_has_no_rim() -> None:
