@@ -38,9 +38,15 @@ def entry() -> configparser.SectionProxy:
 def test_the_entry_names_files_that_are_there() -> None:
     assert entry()["Icon"] == ID
     assert (LINUX / f"{ID}.svg").is_file()
-    assert entry()["Exec"] == "objectmorpher %f"
+    assert entry()["Exec"] == "objectmorpher %F", "it opens several photos, each in a tab"
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["scripts"]
     assert "objectmorpher" in scripts
+
+
+def test_every_system_and_the_page_know_the_program_by_one_id() -> None:
+    spec = (ROOT / "packaging" / "objectmorpher.spec").read_text("utf-8")
+    assert re.findall(r'bundle_identifier="([^"]+)"', spec) == [ID]
+    assert f"application's id, `{ID}`" in (ROOT / "docs" / "install.md").read_text("utf-8")
 
 
 def test_the_types_it_opens_are_those_that_the_program_opens() -> None:

@@ -19,7 +19,7 @@ import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import platformdirs
 
@@ -38,6 +38,7 @@ WAIT = 20.0  # s for an answer, and between two blocks
 MIRROR_BLOCK = 1 << 18  # bytes read at a time
 SCHEMES = ("https://", "http://")
 
+Answer = TypeVar("Answer")
 log = logging.getLogger(__name__)
 
 
@@ -62,24 +63,39 @@ def fetch_mirrored(wanted: Weight, target: Path, progress: Progress) -> bool:
             if _copy(f"{address}/{wanted.file}", wanted, target, progress):
                 return True
             reason = "it has another size"
-        except (URLError, HTTPException, TimeoutError) as error:
+        except (URLError, HTTPException) as error:
             reason = str(error)
         log.info("%s does not come from %s: %s", wanted.id, address, reason)
     return False
 
 
 def _copy(address: str, wanted: Weight, target: Path, progress: Progress) -> bool:
-    """Write what `address` answers to `target`; no more of it than the weight has."""
+    """Write what `address` answers to `target`; no more of it than the weight has.
+
+    Raises OSError: URLError where it does not answer or breaks off, another where the disk is full.
+    """
     from urllib.request import urlopen
 
     count = 0
-    with urlopen(address, timeout=WAIT) as answer, target.open("wb") as file:
-        while count <= wanted.size and (block := answer.read(MIRROR_BLOCK)):
+    with _of_network(lambda: urlopen(address, timeout=WAIT)) as answer, target.open("wb") as file:
+        while count <= wanted.size and (block := _of_network(lambda: answer.read(MIRROR_BLOCK))):
             file.write(block)
             count += len(block)
             note = f"downloading {wanted.id}: {count >> 20} of {wanted.size >> 20} MB"
             progress(min(count / wanted.size, 1.0), note)
     return count == wanted.size
+
+
+def _of_network(ask: Callable[[], Answer]) -> Answer:
+    """What `ask` gives; whatever the system says of the connection is raised as URLError."""
+    from urllib.error import URLError
+
+    try:
+        return ask()
+    except URLError:
+        raise
+    except OSError as error:  # reset, unreachable, too slow, badly encrypted
+        raise URLError(error) from error
 
 
 BLOCK = 1 << 20  # bytes read at a time

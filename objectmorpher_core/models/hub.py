@@ -22,6 +22,7 @@ from ..base.progress import Progress, part, silent
 from ..base.quoting import shown
 from . import hub_download
 from .fetch import SLACK, check_online, folder, run_watched, sha256_of
+from .onnx_graphs import check_graphs
 from .registry import HubModel, ModelError, families, hub_model, hub_models, with_needs
 from .tensors_only import convert
 from .weight_folder import (
@@ -174,9 +175,10 @@ def use_folder(id: str, at: Path) -> HubState:
             at, names = at.parent, (at.name,)
         else:
             names = check_folder(family, at)
+        check_graphs(family, at, names)
         id = _nearest(family, sum((at / n).stat().st_size for n in names)) if id == family else id
         facts = {name: FileFacts((at / name).stat().st_size, "") for name in names}
-        write(id, Locked(facts, folder=str(at)))
+        write(id, Locked(facts, folder=str(at), ours=_ours(id)))
     except OSError as error:
         raise ModelError(f"{at.name} cannot be used: {error.strerror or error}") from error
     return look_hub(id)
@@ -221,7 +223,7 @@ def convert_folder(id: str, at: Path, progress: Progress = silent) -> HubState:
 
 
 def remove_hub(id: str) -> None:
-    """Remove a model; a folder of the user's is forgotten, not deleted.
+    """Remove a model; a folder of the user's is forgotten, and what was there before it is used.
 
     Which commit it was stays in the lock file. Raises ModelError.
     """
@@ -229,12 +231,19 @@ def remove_hub(id: str) -> None:
     known = locked(id)
     try:
         if known is not None and known.folder:
-            write(id, None)
+            write(id, known.ours)
+            return
         for left in (folder() / model.id, folder() / (PARTIAL + model.id)):
             if left.exists():
                 shutil.rmtree(left)
     except OSError as error:
         raise ModelError(f"{id} cannot be removed: {error.strerror or error}") from error
+
+
+def _ours(id: str) -> Locked | None:
+    """What is known of the files in our own folder, also beneath a folder of the user's."""
+    known = locked(id)
+    return known.ours if known is not None and known.folder else known
 
 
 def _nearest(family: str, size: int) -> str:
@@ -251,7 +260,7 @@ def _state(model: HubModel, is_hashed: bool) -> HubState:
     reason = _damage(at, known, is_hashed)
     if not reason and known.folder and is_hashed:
         try:
-            check_files(model.family, at)
+            check_graphs(model.family, at, check_files(model.family, at, tuple(known.files)))
         except ModelError as error:
             reason = str(error)
     state = "damaged" if reason else "ok"
@@ -280,9 +289,7 @@ def _download(model: HubModel, progress: Progress) -> None:
     where.mkdir(parents=True, exist_ok=True)
     partial, at = where / (PARTIAL + model.id), where / model.id
     partial.mkdir(exist_ok=True)
-    pinned = locked(model.id)
-    if pinned is not None and pinned.folder:
-        pinned = None
+    pinned = _ours(model.id)
     revision = model.revision or (pinned.revision if pinned else "")
     known = {name: fact.sha256 for name, fact in pinned.files.items()} if pinned else {}
     request = {
@@ -410,6 +417,7 @@ class Locked:
     files: Mapping[str, FileFacts]  # by path, in the model's folder
     revision: str = ""  # commit of its repository
     folder: str = ""  # the user's own; empty: ours
+    ours: Locked | None = None  # what is used once the user's own folder is forgotten
 
 
 def locked(id: str) -> Locked | None:
@@ -452,4 +460,7 @@ def _entry(told: dict) -> Locked:
         for name, fact in told["files"].items()
         if not Path(name).is_absolute() and ".." not in Path(name).parts
     }
-    return Locked(facts, str(told["revision"]), str(told["folder"]))
+    ours = told.get("ours")
+    return Locked(
+        facts, str(told["revision"]), str(told["folder"]), None if ours is None else _entry(ours)
+    )

@@ -45,6 +45,11 @@ class ModelError(RuntimeError):
     """A weight that is unknown, or could not be had. The message is one sentence for the user."""
 
 
+def unusable(id: str, reason: object) -> str:
+    """Say that a model which is there cannot be used, and what takes it away."""
+    return f"{id} cannot be used: {reason}; to do without it: `objectmorpher models remove {id}`"
+
+
 @dataclass(frozen=True)
 class Weight:
     """A file of learned weights."""

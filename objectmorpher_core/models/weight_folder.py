@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,16 +83,27 @@ def check_folder(family: str, at: Path) -> tuple[str, ...]:
 
 def check_file(family: str, at: Path) -> None:
     """Raises ModelError where one file cannot be a model of `family`."""
-    if family not in ONE_GRAPH:
+    is_adapter = family.endswith(ADAPTER)
+    if not is_adapter and family not in ONE_GRAPH:
         raise ModelError(f"{family} is a folder of files, and {at.name} is a file")
-    if at.suffix != GRAPH:
-        raise ModelError(f"{at.name} is no {GRAPH} file")
+    if at.suffix != (ending := PLAIN if is_adapter else GRAPH):
+        _refuse_pickled(at.parent, [at.name], False)
+        raise ModelError(f"{at.name} is no {ending} file")
+    if is_adapter:
+        check_safetensors(at)
 
 
-def check_files(family: str, at: Path) -> None:
-    """Check a folder that was added like `check_folder`; beside one graph others may lie."""
-    if family not in ONE_GRAPH:
-        check_folder(family, at)
+def check_files(family: str, at: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Check what was added like `check_folder`; beside the one file of a model others may lie.
+
+    `names`: of what was added.
+    """
+    if family not in ONE_GRAPH and not family.endswith(ADAPTER):
+        return check_folder(family, at)
+    if len(names) != 1:
+        raise ModelError(f"{family} is one file, and {len(names)} were added of {at.name}")
+    check_file(family, at / names[0])
+    return tuple(names)
 
 
 def pickled_latent(family: str, at: Path) -> dict[str, Path]:

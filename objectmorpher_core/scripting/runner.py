@@ -34,6 +34,7 @@ from ..document.model import (
 from ..document.placement import grown, is_in_place, set_seen_from, spun
 from ..document.settings import DeformSettings, Hint, Shadow
 from ..document.transparency import continued, with_opacity
+from ..lift.workers.file import worker_names
 from ..pictures.image import naming, read_mask
 from ..raster.trust import SIGNS, trust_in
 from .background import LIGHT, LIGHT_LIFTERS, PlateAhead, PlateTask, ShadowCaster
@@ -54,7 +55,7 @@ def refuse_missing(script: EditScript, others: Others = ALONE) -> None:
 def _refuse_missing(script: EditScript) -> None:
     chosen = (
         ("segmenter", script.segment, segment.BACKENDS),
-        ("lifter", script.lift, lift.BACKENDS),
+        ("lifter", script.lift, (*lift.BACKENDS, *worker_names())),
         ("inpainter", script.inpaint, compose.BACKENDS),
     )
     for kind, name, known in chosen:  # also where the stage will not run

@@ -121,6 +121,19 @@ def test_a_folder_of_frames_holds_one_film(folder, capsys):
     assert _edit(*video, "0.4") == 0
 
 
+@pytest.mark.parametrize("way", ["option", "script"])
+def test_a_program_of_the_users_lifts_by_its_name(folder, monkeypatch, capsys, way):
+    monkeypatch.setenv("OBJECTMORPHER_WORKERS", str(ROOT / "packaging" / "workers"))
+    Path("edit.json").write_text('{"lift": "card"}')
+    wish = ["--lift", "card"] if way == "option" else ["--script", "edit.json"]
+    assert _edit(*wish, "--move", "20,0", "--report", "report.json") == 0, capsys.readouterr().err
+    assert json.loads(Path("report.json").read_text())["backends"]["lift"] == "card"
+    assert (_pixels("out.png") != PIXELS).any()
+    capsys.readouterr()
+    assert _edit("--lift", "magic") == 1 and "known are relief" in (err := capsys.readouterr().err)
+    assert "card" in err
+
+
 def test_nothing_to_do_gives_the_photo_back(folder):
     assert _edit() == 0
     assert np.array_equal(_pixels("out.png"), PIXELS)

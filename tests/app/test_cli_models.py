@@ -122,6 +122,48 @@ def test_a_folder_is_added_and_forgotten(capsys, tmp_path: Path) -> None:
     assert code == 1 and "only pickled weights" in err
 
 
+def test_each_name_that_can_be_added_is_named_once(capsys) -> None:
+    _, _, err = said(capsys, "add", "dinosaur", "x")
+    names = err.strip().partition("known are ")[2].split(", ")
+    assert len(names) == len(set(names))
+    assert set(names) == {"depth", *models.families(), *(m.id for m in models.hub_models())}
+
+
+def test_a_family_is_removed_where_one_folder_is_meant(capsys, tmp_path: Path) -> None:
+    for name, data in TINY_SAM2.items():
+        (tmp_path / name).write_bytes(data)
+    code, out, err = said(capsys, "remove", "sam2")
+    assert code == 1 and out == "" and "sam2 is a family" in err and "none of them is there" in err
+    assert said(capsys, "add", "sam2", str(tmp_path))[0] == 0
+    gone = f"{FREE.id}: {tmp_path} is no longer used\n"
+    assert said(capsys, "remove", "sam2")[:2] == (0, gone)
+    assert models.place(FREE.id) is None
+    for id in (FREE.id, "sam2.1-large"):
+        assert said(capsys, "add", id, str(tmp_path))[0] == 0
+    code, out, err = said(capsys, "remove", "sam2")
+    assert code == 1 and out == "" and f"sam2.1-large, {FREE.id}" in err
+    for words, sentence in ((["dinosaur"], "no model called 'dinosaur'"), ([], "which model")):
+        code, out, err = said(capsys, "remove", *words)
+        assert code == 1 and out == "" and sentence in err and "models list" in err
+    assert models.place(FREE.id) == models.place("sam2.1-large") == tmp_path
+
+
+def test_the_list_and_verifying_agree_on_damage(capsys, cache: Path) -> None:
+    cache.mkdir(parents=True)
+    (cache / models.weight("u2netp").file).write_bytes(b"not a network")
+    lines = {line.split()[0]: line for line in said(capsys, "list")[1].splitlines()}
+    assert " damaged " in lines["u2netp"] and " not installed " in lines["dinov2-vits14"]
+    assert "u2netp: damaged" in said(capsys, "verify")[1].splitlines()
+
+
+def test_verifying_says_that_a_folder_of_the_users_has_no_known_hash(capsys, tmp_path) -> None:
+    for name, data in TINY_SAM2.items():
+        (tmp_path / name).write_bytes(data)
+    assert said(capsys, "add", "sam2", str(tmp_path))[0] == 0
+    code, out, _ = said(capsys, "verify", FREE.id)
+    assert code == 0 and out.startswith(f"{FREE.id}: ok (yours: ") and "hash is not kept" in out
+
+
 def test_the_doctor_tells_what_each_stage_uses_and_what_would_help(capsys) -> None:
     assert cli.main(["doctor"]) == 0
     out = capsys.readouterr().out

@@ -17,6 +17,8 @@ from .idle_options import refuse_idle, said_on
 from .terminal import UsageError, progress_bar
 
 WIDE, NARROW = 34, 12  # characters of the list's columns
+# What verifying leaves open of a folder of the user's.
+UNHASHED = "yours: it has the kind and size of what was added, whose hash is not kept"
 THERE = {"ok": "installed", "missing": "not installed", "damaged": "damaged"}
 
 
@@ -50,7 +52,7 @@ def _add(id: str, source: Path, is_converted: bool) -> None:
     if id in {kind.id for kind in models.KINDS}:
         _write(_line_of_added(models.add(id, source)))
         return
-    known = (*models.families(), *(model.id for model in models.hub_models()))
+    known = dict.fromkeys((*models.families(), *(model.id for model in models.hub_models())))
     if id not in known:
         names = ", ".join((*(kind.id for kind in models.KINDS), *known))
         raise UsageError(f"nothing can be added as {id!r}; known are {names}")
@@ -58,14 +60,39 @@ def _add(id: str, source: Path, is_converted: bool) -> None:
 
 
 def _remove(id: str) -> None:
-    if id in {model.id for model in models.hub_models()}:
-        models.remove_hub(id)
+    several = {model.id for model in models.hub_models()}
+    if id in several or id in models.families():
+        _remove_hub(id if id in several else _own_of(id))
     elif id in {weight.id for weight in models.weights()}:
         models.remove_weight(id)
     elif id in worker_file.worker_names():
         worker_file.forget_licence(id)
-    else:
+    elif id in {kind.id for kind in models.KINDS}:
         models.remove(id)
+    else:
+        told = f"there is no model called {id!r}" if id else "which model is to be removed"
+        raise UsageError(f"{told}, see `models list`")
+
+
+def _own_of(family: str) -> str:
+    """The one model of a family that is a folder of the user's. Raises UsageError."""
+    states = [models.look_hub(m.id) for m in models.hub_models() if m.family == family]
+    own = [state.model.id for state in states if state.is_own]
+    if len(own) != 1:
+        there = [state.model.id for state in states if state.state != "missing"]
+        told = f"these are there: {', '.join(there)}" if there else "none of them is there"
+        raise UsageError(f"{family} is a family, remove one of its models by its id; {told}")
+    return own[0]
+
+
+def _remove_hub(id: str) -> None:
+    """What happens to a folder of the user's, which stays where it is, is said."""
+    before = models.look_hub(id)
+    models.remove_hub(id)
+    if before.is_own:
+        after = models.look_hub(id)
+        again = "" if after.state == "missing" else f"; {after.path} is used again"
+        _write(f"{id}: {before.path} is no longer used{again}")
 
 
 def _get(options: argparse.Namespace) -> None:
@@ -198,6 +225,8 @@ def _look(action: str, id: str | None) -> None:
         if action == "verify":
             state = THERE["missing"] if found.state == "missing" else found.state
             reason = "optional" if is_optional else getattr(found, "reason", "")
+            if isinstance(found, HubState) and found.is_own and found.state == "ok":
+                reason = UNHASHED
             _write(f"{name}: {state}{f' ({reason})' if reason else ''}")
         elif found.state == "ok":
             _write(str(found.path))
@@ -214,7 +243,7 @@ def _name_of(found: CacheState | Added | HubState) -> str:
 
 def _line_of(state: CacheState) -> str:
     weight = state.weight
-    there = "installed" if state.state == "ok" else "not installed"
+    there = THERE[state.state]
     return _columns(weight.id, _size(weight.size), weight.licence, there, weight.purpose)
 
 

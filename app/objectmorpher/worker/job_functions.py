@@ -122,6 +122,14 @@ def add_model(id: str, path: Path, progress: Progress) -> Added:
     return models.add(id, path)
 
 
+def use_model_folder(id: str, folder: Path, progress: Progress) -> Path:
+    """A folder of the user's looked at, and used as a model of several files; the folder."""
+    from objectmorpher_core import models
+
+    progress(0.1, "trying it")
+    return models.use_folder(id, folder).path
+
+
 def forget_segmenter(progress: Progress) -> None:
     """The next photo or click chooses the backend anew: a model was added."""
     _memory.forget()

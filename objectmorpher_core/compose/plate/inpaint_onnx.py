@@ -19,13 +19,12 @@ from ... import models
 from ...base.arrays import F32, Mask, Pixels
 from ...base.progress import Progress
 from ...models import ModelError
-from ...models.onnx_session import open_session
+from ...models.onnx_graphs import FILLERS, filler_inputs, fixed_sides, opened
 from .. import InpaintError
 from .hole_squares import Filler, fill_squares
 
 SIDE = 512  # px that both were trained with, where a file does not say
 BYTES = 16.0  # x the picture's brightness; what comes out brighter is in [0, 255]
-NAMES = {"lama": "LaMa", "migan": "MI-GAN"}
 
 
 class OnnxInpainter:
@@ -44,7 +43,7 @@ class OnnxInpainter:
         except ModelError as error:
             return str(error)
         how = f"`objectmorpher models get {self.name}`"
-        return None if is_here else f"{NAMES[self.name]} is not here: {how}"
+        return None if is_here else f"{FILLERS[self.name]} is not here: {how}"
 
     def inpaint(self, rgb: Pixels, hole: Mask, progress: Progress, seed: int = 0) -> Pixels:
         """See `Inpainter`. The seed changes nothing."""
@@ -56,7 +55,7 @@ class OnnxInpainter:
             network = OnnxNetwork(found[0], self.name)
             return fill_squares(rgb, hole, Filler(network.side, network.fill), progress)
         except ModelError as error:
-            raise InpaintError(str(error)) from error
+            raise InpaintError(models.unusable(self.name, error)) from error
 
 
 class OnnxNetwork:
@@ -64,21 +63,11 @@ class OnnxNetwork:
 
     def __init__(self, path: Path, family: str) -> None:
         """Raises ModelError: one sentence."""
-        try:
-            self._session: Any = open_session(path, is_foreign=True)
-        except Exception as error:  # onnxruntime has a type of its own for everything
-            raise ModelError(f"{path.name} is not an ONNX network that can be opened") from error
+        self._session: Any = opened(path)
         self._family = family
         self._name = path.name
-        inputs = {len(i.shape) == 4 and i.shape[1]: i for i in self._session.get_inputs()}
-        if not ({3, 1} == inputs.keys() or {4} == inputs.keys()):
-            given = [f"{i.name} {i.shape}" for i in self._session.get_inputs()]
-            raise ModelError(f"{path.name} takes {', '.join(given)}: no known {NAMES[family]}")
-        self._inputs = inputs
-        first = inputs.get(3) or inputs[4]
-        fixed = [n for n in first.shape[2:] if isinstance(n, int) and n > 0]
-        if len(set(fixed)) > 1:
-            raise ModelError(f"{path.name} sees {fixed[1]} x {fixed[0]} px, not a square")
+        self._inputs = filler_inputs(self._session, path.name, family)
+        fixed = fixed_sides(self._inputs)
         self.side = fixed[0] if fixed else SIDE
 
     def fill(self, picture: F32, hole: Mask, progress: Progress, seed: int) -> F32:

@@ -336,8 +336,7 @@ def adapter_files(*wanted: tuple[str, str]) -> tuple[tuple[str, Path], ...]:
     found = []
     for name, family in wanted:
         for model in models.installed(family)[:1]:
-            folder = models.place(model.id)
-            files = sorted(folder.rglob(f"*{PLAIN}")) if folder is not None else []
+            files = [file for file in models.files(model.id) if file.suffix == PLAIN]
             found += [(name, file) for file in files[:1]]
     return tuple(found)
 

@@ -44,7 +44,7 @@ def look(pixels: Pixels, mask: Mask) -> NetworkDepth | None:
         inverse = _looks.get(lambda: _opened(there).inverse_depth(rgb), rgb, about=there.id)
         return NetworkDepth(inverse, box)
     except models.ModelError as error:
-        raise LiftError(f"{error}; without the depth model it can be lifted") from error
+        raise LiftError(models.unusable(there.model, error)) from error
 
 
 def look_at_all(pixels: Pixels) -> F32 | None:
@@ -61,6 +61,7 @@ class There:
     """A depth network on this machine."""
 
     id: str  # changes with its files
+    model: str  # its name among the models
     at: Path
     is_onnx: bool
 
@@ -69,16 +70,16 @@ def installed() -> There | None:
     """The network that is looked with: the user's file, else one of ours, by PyTorch the last."""
     own = models.added("depth")
     if own.state == "ok":
-        return There(own.sha256, own.path, True)
+        return There(own.sha256, own.kind.id, own.path, True)
     for model in models.installed(GRAPHS)[:1]:
         (file,) = (f for f in models.files(model.id) if f.suffix == ".onnx")
         facts = file.stat()
-        return There(f"{file}:{facts.st_size}:{facts.st_mtime_ns}", file, True)
+        return There(f"{file}:{facts.st_size}:{facts.st_mtime_ns}", model.id, file, True)
     at = models.place(DEPTH_ANYTHING)
     if at is None or any(find_spec(name) is None for name in PACKAGES):
         return None
     facts = (at / "model.safetensors").stat() if (at / "model.safetensors").exists() else at.stat()
-    return There(f"{at}:{facts.st_size}:{facts.st_mtime_ns}", at, False)
+    return There(f"{at}:{facts.st_size}:{facts.st_mtime_ns}", DEPTH_ANYTHING, at, False)
 
 
 def box_around(mask: Mask) -> tuple[int, int, int, int]:

@@ -8,7 +8,6 @@ pixels (h, w, 3). EfficientSAM's (`batched_point_coords`, ...): its encoder take
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from ... import models
 from ...base.arrays import F32, RGB
 from ...models import HubModel, ModelError
-from ...models.onnx_session import open_session
+from ...models.onnx_graphs import EFFICIENT, SCORES, opened, sam_inputs
 from ...models.weight_folder import check_folder
 from .view import CORNER, GROUND, NOTHING, OBJECT, OTHER_CORNER, Asked, Masks, normalized
 
@@ -34,15 +33,11 @@ class SamOnnx:
         if folder is None:
             raise ModelError(f"{model.id} is not here: {model.home}")
         encoder, decoder = (folder / name for name in check_folder(model.family, folder))
-        self._encoder, self._decoder = _session(encoder), _session(decoder)
-        self._inputs = {i.name: i for i in self._decoder.get_inputs()}
-        self._picture = self._encoder.get_inputs()[0]
-        if "batched_point_coords" in self._inputs:
-            self._is_efficient = True
-        elif {"point_coords", "point_labels", "mask_input"} <= self._inputs.keys():
-            self._is_efficient = False
-        else:
-            raise ModelError(f"{decoder.name} takes {', '.join(self._inputs)}: not a known layout")
+        self._encoder, self._decoder = opened(encoder), opened(decoder)
+        self._picture, self._inputs = sam_inputs(
+            self._encoder, self._decoder, (encoder.name, decoder.name)
+        )
+        self._is_efficient = self._inputs.keys() >= EFFICIENT
         self.is_padded = not self._is_efficient
         fixed = [n for n in self._picture.shape if isinstance(n, int) and n > 3]
         self.side = fixed[0] if fixed else SIDE
@@ -129,7 +124,7 @@ class SamOnnx:
         }
         names = [output.name for output in self._decoder.get_outputs()]
         found = dict(zip(names, _run(self._decoder, fed), strict=True))
-        scores = np.asarray(found["iou_predictions"], np.float32).reshape(-1)
+        scores = np.asarray(found[SCORES], np.float32).reshape(-1)
         key = "low_res_masks" if "low_res_masks" in found else names[0]
         logits = np.asarray(found[key], np.float32)
         logits = logits.reshape(-1, *logits.shape[-2:])
@@ -156,14 +151,6 @@ def _labelled(asked: Asked) -> tuple[np.ndarray, np.ndarray]:
     corners = asked.box.reshape(2, 2)
     both = np.concatenate([corners, asked.points])
     return both, np.concatenate([[CORNER, OTHER_CORNER], labels])
-
-
-def _session(path: Path) -> Any:
-    """Raises ModelError where it is no ONNX network."""
-    try:
-        return open_session(path, is_foreign=True)
-    except Exception as error:  # onnxruntime has a type of its own for everything
-        raise ModelError(f"{path.name} is not an ONNX network that can be opened") from error
 
 
 def _run(session: Any, given: dict[str, Any]) -> list[Any]:

@@ -153,7 +153,7 @@ class Sam:
             try:
                 self._network, self._open_id = open_network(model), model.id
             except ModelError as error:
-                raise SelectionError(str(error)) from error
+                raise SelectionError(models.unusable(model.id, error)) from error
         return self._network
 
     def _encode(self, network: SamNetwork, rgb: RGB, box: Box) -> Encoded:

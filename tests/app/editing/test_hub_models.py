@@ -12,6 +12,7 @@ import pytest
 from editor_steps import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents import models as hub_models
+from objectmorpher.editor.settings import Settings
 from objectmorpher.gui.dialogs.models_dialog import GAINS, NAMES, SETS, SIZES, STAGES
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Progress
@@ -37,6 +38,14 @@ def choosing(editor: Editor) -> Editor:
     editor.models.look()
     wait_until(editor, lambda: editor.chores.is_idle)
     return editor
+
+
+@pytest.fixture
+def own_editor(cache: Path, compiled: None) -> Iterator[Editor]:
+    """An editor whose worker process keeps models in the test's own folder, too."""
+    editor = Editor(Settings())
+    yield editor
+    editor.shut_down()
 
 
 def settle(editor: Editor) -> None:
@@ -94,12 +103,13 @@ def test_a_licence_is_accepted_before_a_download(
 
 @pytest.mark.slow
 def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
-    choosing: Editor, tmp_path: Path
+    own_editor: Editor, tmp_path: Path
 ) -> None:
-    hub, folder = choosing.models.hub, tmp_path / "mine"
+    choosing, hub, folder = own_editor, own_editor.models.hub, tmp_path / "mine"
     folder.mkdir()
     hub.wanted = FREE.id
     hub.use_folder(folder / "config.json")
+    settle(choosing)
     assert choosing.message is not None and "holds no" in choosing.message.text
     for name, data in TINY_SAM2.items():
         (folder / name).write_bytes(data)

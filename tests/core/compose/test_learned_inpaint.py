@@ -228,8 +228,12 @@ def test_a_file_cut_off_is_one_sentence(family, view, hole):
         with pytest.raises(ModelError, match="cut off"):
             models.use_folder(name, folder)
         return
-    models.use_folder(name, folder)
-    with pytest.raises(InpaintError, match="can be opened"):
+    with pytest.raises(ModelError, match="can be opened"):
+        models.use_folder(name, folder)
+    weights.write_bytes(bytes(len(content)))
+    assert models.look_hub(name).state == "ok", "its size is right"
+    assert "can be opened" in models.verify_hub(name).reason
+    with pytest.raises(InpaintError, match=rf"^{name} .*can be opened.*`.* models remove {name}`"):
         load(name).inpaint(view, hole, silent)
 
 
@@ -347,15 +351,18 @@ def test_lama_in_either_numbers_is_the_same(tmp_path, view, hole, dark):
     np.testing.assert_allclose(answers[0][~inside], picture[~inside], atol=F32)
 
 
-def test_another_network_is_refused(tmp_path, monkeypatch):
+@pytest.mark.parametrize("name", ["lama", "migan"])
+def test_another_network_is_refused(tmp_path, monkeypatch, name):
     from tests.core.models.small_networks import brightness
 
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
-    at = tmp_path / "depth.onnx"
-    at.write_bytes(brightness())
-    models.use_folder("lama", at)
-    with pytest.raises(InpaintError, match="no known LaMa"):
-        load("lama").inpaint(np.zeros((9, 9, 3), np.uint8), np.eye(9, dtype=bool), silent)
+    at = tmp_path / "other.onnx"
+    for data, sentence in ((brightness(), "no known"), (b"hello", "not an ONNX"), (b"", "ONNX")):
+        at.write_bytes(data)
+        for given in (at, tmp_path):
+            with pytest.raises(ModelError, match=sentence):
+                models.use_folder(name, given)
+    assert models.look_hub(name).state == "missing" and load("auto").name == "patchmatch"
     (tmp_path / "weights.pt").write_bytes(b"")
-    with pytest.raises(ModelError, match=r"no \.onnx file"):
-        models.use_folder("lama", tmp_path / "weights.pt")
+    with pytest.raises(ModelError, match=r"pickled weights \(weights\.pt\)"):
+        models.use_folder(name, tmp_path / "weights.pt")

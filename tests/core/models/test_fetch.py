@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import os
+import socket
+import struct
 import zipfile
 from collections.abc import Iterator
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
+from time import sleep
 from typing import Any
 
 import pytest
@@ -216,6 +219,39 @@ def test_a_mirror_that_lacks_it_or_does_not_answer_is_passed_over(cache, mirror,
     with pytest.raises(models.ModelError, match="no address of the web"):
         models.fetch(SMALL.id)
     assert left_in(cache) == []
+
+
+@pytest.mark.parametrize("after", [None, 0, 100_000])
+def test_a_mirror_that_breaks_off_is_passed_over(
+    cache, tmp_path, monkeypatch, genuine_wheel, after
+):
+    """It closes with bytes unread, and with what it sends unsent: the system resets the connection.
+
+    `after` so many bytes of the file, or before it has answered anything.
+    """
+    asked = []
+
+    def answer(server: socket.socket) -> None:
+        while True:
+            try:
+                connection, _ = server.accept()
+            except OSError:  # closed: the test is over
+                return
+            asked.append(connection.recv(1 << 16))
+            if after is not None:
+                head = f"HTTP/1.1 200 OK\r\nContent-Length: {SMALL.size}\r\n\r\n".encode()
+                connection.sendall(head + bytes(after))
+            sleep(0.1)  # what was sent is there before the connection is reset
+            now = struct.pack("ii", 1, 0)
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, now)
+            connection.close()
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        Thread(target=answer, args=(server,), daemon=True).start()
+        monkeypatch.setenv("OBJECTMORPHER_MIRROR", f"http://127.0.0.1:{server.getsockname()[1]}")
+        path = models.fetch(SMALL.id)
+        server.shutdown(socket.SHUT_RDWR)
+    assert asked and path == models.path(SMALL.id) and left_in(cache) == [SMALL.file]
 
 
 def test_what_only_evaluation_needs_is_not_missed_and_not_got_unasked(capsys, monkeypatch):

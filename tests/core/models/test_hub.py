@@ -15,6 +15,7 @@ import pytest
 
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled
+from objectmorpher_core.compose.refine.diffusion import adapter_files
 from objectmorpher_core.models import hub, registry
 from objectmorpher_core.models.hub_download import PART
 from objectmorpher_core.models.weight_folder import check_folder, check_safetensors
@@ -255,6 +256,52 @@ def test_a_folder_is_used_where_it_is_and_forgotten(own: Path, cache: Path) -> N
     assert models.place(FREE.id) is None and (own / "config.json").exists()
 
 
+def test_what_lay_beneath_a_folder_is_used_again_and_deleted_by_a_second_call(
+    own: Path, server: Hub, cache: Path
+) -> None:
+    at = models.get(FREE.id)
+    shutil.copytree(own, own.with_name("second"))
+    for folder in (own, own.with_name("second")):  # one folder after another forgets neither
+        assert models.use_folder(FREE.id, folder).path == folder
+    models.remove_hub(FREE.id)
+    state = models.verify_hub(FREE.id)
+    assert (state.state, state.path, state.revision, state.is_own) == ("ok", at, COMMIT, False)
+    models.remove_hub(FREE.id)
+    assert models.look_hub(FREE.id).state == "missing" and not at.exists() and own.exists()
+    models.use_folder(FREE.id, own)
+    models.remove_hub(FREE.id)
+    known = hub.locked(FREE.id)
+    assert known is not None and known.revision == COMMIT, "the commit stays known"
+
+
+def test_a_lock_file_of_before_leaves_a_download_beneath_a_folder(own: Path, cache: Path) -> None:
+    """What an older version wrote of a folder says nothing of a download."""
+    models.use_folder(FREE.id, own)
+    told = json.loads((cache / hub.NAME).read_text())
+    del told["models"][FREE.id]["ours"]
+    (cache / hub.NAME).write_text(json.dumps(told))
+    (cache / FREE.id).mkdir()
+    assert models.place(FREE.id) == own
+    models.remove_hub(FREE.id)
+    assert models.place(FREE.id) is None and (cache / FREE.id).exists()
+
+
+@pytest.mark.parametrize("id", ["qwen-refine-lora", "klein-remove-lora"])
+def test_an_adapter_is_taken_as_a_file_beside_others(own: Path, id: str) -> None:
+    file = own / "adapter.safetensors"
+    file.write_bytes(WEIGHTS)
+    with pytest.raises(models.ModelError, match="it has 2"):
+        models.use_folder(id, own)
+    assert models.use_folder(id, file).state == "ok" and models.files(id) == (file,)
+    assert models.verify_hub(id).state == "ok"
+    assert adapter_files(("a", id)) == (("a", file),)
+    for name, data in (("a.pt", WEIGHTS), ("a.onnx", WEIGHTS), ("a.safetensors", WEIGHTS[:-1])):
+        (own / name).write_bytes(data)
+        with pytest.raises(models.ModelError):
+            models.use_folder(id, own / name)
+    assert models.files(id) == (file,)
+
+
 def test_a_folder_for_a_family_is_the_model_of_its_size(own: Path) -> None:
     assert models.use_folder("sam2", own).model.id == "sam2.1-tiny"  # 3 MB: nearest to the smallest
 
@@ -319,3 +366,7 @@ def test_paths_in_the_lock_file_stay_inside_the_folder(cache: Path) -> None:
     (cache / hub.NAME).write_text(json.dumps({"version": 1, "models": {FREE.id: entry}}))
     found = hub.locked(FREE.id)
     assert found is not None and not found.files
+    entry["folder"] = str(cache)
+    told = {"lama": entry, "qwen-refine-lora": entry, "mobile-sam": entry}
+    (cache / hub.NAME).write_text(json.dumps({"version": 1, "models": told}))
+    assert all(models.verify_hub(id).reason for id in told), "of no file of it anything is known"

@@ -9,6 +9,7 @@ onnx = pytest.importorskip("onnx")
 from onnx import TensorProto, helper, numpy_helper  # noqa: E402
 
 from objectmorpher_core import models  # noqa: E402
+from objectmorpher_core.lift import LiftError  # noqa: E402
 from objectmorpher_core.lift.relief import depth_look  # noqa: E402
 from objectmorpher_core.models.depth_net import DepthNet, seen_at  # noqa: E402
 from tests import photos  # noqa: E402
@@ -81,7 +82,16 @@ def test_the_relief_looks_with_it_without_pytorch(tmp_path, monkeypatch):
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
     (tmp_path / "net.onnx").write_bytes(graph(*scene(600.0, 0.0)[:2]))
     assert depth_look.installed() is None
+    (tmp_path / "notes.onnx").write_text("hello")
+    with pytest.raises(models.ModelError, match="not an ONNX network"):
+        models.use_folder("moge-2-vits", tmp_path / "notes.onnx")
+    assert depth_look.installed() is None
     models.use_folder("moge-2-vits", tmp_path / "net.onnx")
     there = depth_look.installed()
     assert there is not None and there.is_onnx and there.at.name == "net.onnx"
     assert DepthNet(there.at).inverse_depth(photos.photo("coffee")[:300, :400]).max() > 0
+    there.at.write_bytes(bytes(there.at.stat().st_size))
+    assert models.verify_hub("moge-2-vits").state == "damaged"
+    photo = photos.photo("coffee")[:300, :400]
+    with pytest.raises(LiftError, match="models remove moge-2-vits"):
+        depth_look.look(photo, np.ones(photo.shape[:2], bool))

@@ -471,14 +471,24 @@ def test_files_that_are_no_sam_are_one_sentence(own_cache, picture):
     at = tiny_sams.write_onnx("sam", own_cache / "onnx")
     encoder, decoder = at / "tiny.encoder.onnx", at / "tiny.decoder.onnx"
     whole = encoder.read_bytes()
-    encoder.write_bytes(whole[: len(whole) // 2])
-    models.use_folder("mobile-sam", at)
-    with pytest.raises(SelectionError, match="not an ONNX network"):
-        segment.load("sam-onnx").encode(picture, silent)
+    layout = decoder.read_bytes()
+    for first, second, sentence in (
+        (whole[: len(whole) // 2], layout, "not an ONNX network"),
+        (whole, whole, "not a known layout"),
+        (whole, b"hello", "not an ONNX network"),
+    ):
+        encoder.write_bytes(first)
+        decoder.write_bytes(second)
+        with pytest.raises(models.ModelError, match=sentence):
+            models.use_folder("mobile-sam", at)
+    assert models.look_hub("mobile-sam").state == "missing"
     encoder.write_bytes(whole)
-    decoder.write_bytes(whole)
+    decoder.write_bytes(layout)
     models.use_folder("mobile-sam", at)
-    with pytest.raises(SelectionError, match="not a known layout"):
+    assert models.verify_hub("mobile-sam").state == "ok"
+    decoder.write_bytes(bytes(len(layout)))
+    assert "not an ONNX network" in models.verify_hub("mobile-sam").reason
+    with pytest.raises(SelectionError, match=r"not an ONNX network.* models remove mobile-sam"):
         segment.load("sam-onnx").encode(picture, silent)
 
 

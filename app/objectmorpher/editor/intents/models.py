@@ -313,15 +313,22 @@ class HubModels:
     def use_folder(self, given: Path) -> None:
         """The folder that a chosen file is in is the model from now on."""
         folder = given if given.is_dir() else given.parent
-        self._change(lambda: models.use_folder(self.wanted, folder))
+        editor = self._editor
+        editor.message = None
+
+        def accept(_: Path) -> None:
+            self._models.look()
+            self._models.use_anew()
+
+        editor.jobs.start(
+            t("Trying {name}", name=folder.name), job_functions.use_model_folder,
+            self.wanted, folder, done=accept, failed=editor.complain_of, kind=ADD,
+        )  # fmt: skip
 
     def remove(self, id: str) -> None:
         """Deletes a downloaded one; a folder of the user's is only forgotten."""
-        self._change(lambda: models.remove_hub(id))
-
-    def _change(self, change: Callable[[], object]) -> None:
         try:
-            change()
+            models.remove_hub(id)
         except models.ModelError as error:
             self._editor.complain(str(error))
         else:
