@@ -9,6 +9,7 @@ object was.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -41,6 +42,7 @@ from .residue import (
 HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the object
 MIN_HOLE_MARGIN = 4.0  # px
 SEAM = 0.45  # x hole margin, width of the seam around the object
+RAMP = 0.6  # of the seam, over which the fill becomes the photo
 REACH = 3.0  # x hole margin: the fill's colour is corrected about so far into the hole
 COARSE = 4.0  # px of hole margin at which the correction is computed
 SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
@@ -171,7 +173,7 @@ def _window(
 def fill_weight(away: F32, margin: float) -> F32:
     """Return the weight of the fill `away` (h, w) px from what hides the background, in place."""
     np.subtract(SEAM * margin, away, out=away)  # all that is as large as the photo
-    away /= 0.6 * SEAM * margin
+    away /= RAMP * SEAM * margin
     return np.clip(away, 0, 1, out=away)
 
 
@@ -240,8 +242,9 @@ def plate_of_holes(
     ghosts = find_ghosts(document, near) if ghosts is None else ghosts
     plate = base or shaded_plate(document, holes, ghosts)
     if plate is not None:
-        shares = shown_shares(document, ghosts, holes)
-        plate = with_ghosts(plate, document.photo.pixels, ghosts, shares)
+        shares, photo = shown_shares(document, ghosts, holes), document.photo.pixels
+        plate = _rejoined(plate, photo, ghosts, shares, margin)
+        plate = with_ghosts(plate, photo, ghosts, shares)
     rest = [o for o in document.objects if o.hides_background and o.matte not in holes]
     if plate is None or not rest:
         return plate
@@ -259,6 +262,39 @@ def plate_of_holes(
     x0, y0, x1, y1 = plate.box
     pixels = np.where(hole[..., None], plate.pixels, document.photo.pixels[y0:y1, x0:x1])
     return replace(plate, pixels=pixels, hole=hole, painted=painted)
+
+
+def _rejoined(
+    plate: Plate, photo: Pixels, ghosts: Sequence[Ghost], shares: Sequence[float], margin: float
+) -> Plate:
+    """`plate` whose fill takes on the colours of the ghosts that stay, where it meets them.
+
+    It was joined to the photo beyond them, and the seam of the object lies between.
+    """
+    pixels, near, reach = None, SEAM * margin, REACH * margin
+    height, width = plate.hole.shape
+    grow = int(np.ceil(reach))
+    for ghost, share in zip(ghosts, shares, strict=True):
+        if share >= 1:
+            continue
+        x0, y0, x1, y1 = ghost.box
+        box = max(x0 - grow, 0), max(y0 - grow, 0), min(x1 + grow, width), min(y1 + grow, height)
+        stays = crop(ghost.there, ghost.box, box)
+        away = distance(stays)
+        seam = plate.hole[box[1] : box[3], box[0] : box[2]] & ~stays & (away < reach)
+        if not seam.any():
+            continue
+        pixels = plate.pixels.copy() if pixels is None else pixels
+        own = pixels[box[1] : box[3], box[0] : box[2]]
+        behind = photo[plate.top :, plate.left :][box[1] : box[3], box[0] : box[2]]
+        true, fill = unit_pixels(behind), unit_pixels(own)
+        change = correction((true - fill) * stays[..., None], stays, margin)
+        change *= np.clip(1 - away / reach, 0, 1)[..., None]
+        weight = np.clip(away / (RAMP * near), 0, 1)[..., None]
+        mixed = true + weight * (np.clip(fill + change, 0, 1) - true)
+        mixed = mixed + np.float32(share) * (fill - mixed)
+        own[seam] = pixels_from_unit(mixed[seam], pixels.dtype)
+    return plate if pixels is None else replace(plate, pixels=pixels)
 
 
 def erased_beside(document: Document, holes: tuple[Matte, ...]) -> tuple[Erased, ...]:

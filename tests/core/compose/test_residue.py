@@ -241,6 +241,24 @@ def test_a_ghost_goes_with_what_stands_beside_it(footless: Document):
     assert left(near) > 0.9 * unlike, "what hardly moved leaves its foot where it is"
 
 
+def test_the_fill_meets_what_stays_beside_an_object(footless: Document):
+    """However unlike the photo it is, which lies beyond that: else a line of it would show."""
+    plate, photo = footless.plate, footless.photo.pixels
+    assert plate is not None
+    black = replace(plate, pixels=np.where(plate.hole[..., None], 0, plate.pixels).astype(np.uint8))
+    near = edits.set_placement(footless, 0, Placement(move=(0.0, -0.3)))
+    near = edits.set_plate(near, black)
+    ghosts = find_ghosts(near, SEAM * MARGIN)
+    there = max(ghosts, key=lambda ghost: int(ghost.there.sum()))
+    found = plate_of_holes(near, holes(near))
+    assert found is not None
+    stays = crop(there.there, there.box, (0, 0, *found.hole.shape[::-1]))
+    seam = found.hole & ~stays & (_away(stays) < 1.5)
+    x0, y0, x1, y1 = found.box
+    off = np.abs(found.pixels.astype(float) - photo[y0:y1, x0:x1])[seam]
+    assert seam.sum() > 20 and off.mean() < 0.35 * photo[y0:y1, x0:x1][seam].mean()
+
+
 def test_a_drag_computes_the_shade_behind_an_object_once(footless, monkeypatch):
     """The window asks for every frame's background, from which other parts of ghosts are gone."""
     derived, made = Derived(), []
