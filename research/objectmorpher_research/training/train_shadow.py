@@ -33,7 +33,7 @@ from .shadows.samples import ShadowSample, make_sample
 from .shadows.scenes import SceneGeometry, make_geometry, packed, unpacked
 from .shadows.solids import silhouettes
 from .shape_data import make_files, write_arrays
-from .train_shape import follow, schedule
+from .train_shape import checkpoint_of, follow, schedule
 
 SHARD = 64  # scenes in a file, and samples that are handed over at once
 BOARDS, BOARDS_SEED = 160, 5
@@ -188,12 +188,11 @@ class ShadowState:
         self.mean = {k: v.clone() for k, v in self.net.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.net.parameters(), plan.rate, weight_decay=DECAY)
         self.loss, self.start = 0.0, start
-        if file.exists():
-            kept = torch.load(file, weights_only=True)
-            if kept["plan"] == repr(plan):
-                self.net.load_state_dict(kept["net"])
-                self.optimiser.load_state_dict(kept["optimiser"])
-                self.mean, self.step = kept["mean"], kept["step"]
+        kept = checkpoint_of(file, repr(plan), torch.device("cpu"))
+        if kept is not None:
+            self.net.load_state_dict(kept["net"])
+            self.optimiser.load_state_dict(kept["optimiser"])
+            self.mean, self.step = kept["mean"], kept["step"]
 
     def learn(self, planes: Tensor, fields: Tensor, labels: Tensor) -> ShadowLosses:
         """Take one step."""
@@ -242,7 +241,7 @@ def train(
     """Train in `folder`, for so many minutes at most.
 
     `weights`: exported ones to go on from, more gently. Raises ValueError for those of another
-    network, and for a folder of grounds without pictures.
+    network, for a folder of grounds without pictures, and for one in which another plan was begun.
     """
     photographs(plan.grounds)  # or there are none
     start = None
@@ -250,8 +249,8 @@ def train(
         start = weights_of(weights, ShadowNet())
         digest = hashlib.sha256(weights.read_bytes()).hexdigest()
         plan = replace(plan, start=digest, rate=GENTLE * plan.rate)
-    files = write_scenes(folder / "scenes", plan, part(progress, 0.0, 0.2))
     state = ShadowState(folder / "shadow.pt", plan, start)
+    files = write_scenes(folder / "scenes", plan, part(progress, 0.0, 0.2))
     begun = saved = time.monotonic()
     spawn, rng = (
         multiprocessing.get_context("spawn"),

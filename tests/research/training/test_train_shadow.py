@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -193,6 +195,11 @@ def test_it_learns_and_runs_without_torch(drawn, tmp_path):
     assert float(after.shade.detach()) < 0.7 * float(before.shade.detach())
     state.save()
     assert train_shadow.ShadowState(state.file, plan).step == state.step == 21
+    before = state.file.read_bytes()
+    for other in (replace(plan, steps=61), replace(plan, seed=1), replace(plan, scenes=1)):
+        with pytest.raises(ValueError, match="begun with other options: give the same"):
+            train_shadow.train(tmp_path, other)
+    assert state.file.read_bytes() == before and not (tmp_path / "scenes").exists()
     net, file = state.trained(), tmp_path / "shadow.onnx"
     train_shadow.export(net, file)
     planes = np.stack([s.planes for s in drawn[:1]])

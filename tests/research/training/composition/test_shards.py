@@ -11,6 +11,7 @@ import os
 import signal
 import time
 from dataclasses import replace
+from itertools import pairwise
 
 import made_up
 import numpy as np
@@ -72,7 +73,7 @@ def test_no_photograph_of_what_is_held_out_is_trained_on(tmp_path, seed):
     rng = np.random.default_rng(seed)
     taken = [rng.bytes(9) for _ in range(40)]
     two = list(zip(taken[::2], taken[1::2], strict=True))  # pictures of 20 things
-    frames = list(zip(taken, taken[1:], strict=False))  # of a video
+    frames = list(pairwise(taken))  # of a video
     for pairs, loses in ((two, False), (frames, True)):
         both_ways = [way for b, a in pairs for way in ((b, a), (a, b))]
         triplets = stored(tmp_path, [both_ways[k] for k in rng.permutation(len(both_ways))])
