@@ -11,7 +11,9 @@ import hashlib
 import multiprocessing
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from multiprocessing.process import BaseProcess
 from multiprocessing.queues import Queue
 from pathlib import Path
 from queue import Empty
@@ -40,6 +42,7 @@ BOARDS, BOARDS_SEED = 160, 5
 OPEN, OTHER_FILE = 8, 0.25  # files of scenes that are at hand; how often one of them is replaced
 RING = 16_000  # samples that are kept
 LEAST = 512  # of them, before anything is learned
+LOOKED = 1.0  # s between two looks at whether those that make samples still do
 RATE, DECAY, STEEPEST = 2e-3, 0.02, 2.0
 GENTLE = 0.35  # x that rate, going on from weights that have learned
 HALF_WAY = 0.5  # from those to the ones that it has learned, is what is exported
@@ -270,7 +273,7 @@ def train(
     try:
         ring = SampleRing()
         while state.step < plan.steps and not (minutes and _since(begun) > 60 * minutes):
-            _take(ring, ready)
+            _take(ring, ready, makers)
             state.learn(*ring.drawn(rng, plan.size))
             progress(0.2 + 0.8 * state.step / plan.steps, f"loss {state.loss:.3f}")
             if _since(saved) > SAVED:
@@ -287,15 +290,20 @@ def _since(start: float) -> float:
     return time.monotonic() - start
 
 
-def _take(ring: SampleRing, ready: Queue) -> None:
-    """All that is ready; at the start, as many samples as learning begins with."""
-    while ring.made < LEAST:
-        ring.add(*ready.get())
+def _take(ring: SampleRing, ready: Queue, makers: Sequence[BaseProcess]) -> None:
+    """All that is ready; at the start, as many samples as learning begins with.
+
+    Raises RuntimeError where one of those that make them has ended.
+    """
     while True:
+        if not all(maker.is_alive() for maker in makers):
+            raise RuntimeError("a process that makes samples has ended: its reason stands above")
+        is_enough = ring.made >= LEAST
         try:
-            ring.add(*ready.get_nowait())
+            ring.add(*(ready.get_nowait() if is_enough else ready.get(timeout=LOOKED)))
         except Empty:
-            return
+            if is_enough:
+                return
 
 
 def export(net: ShadowNet, path: Path) -> str:
