@@ -47,7 +47,9 @@ def add_train(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_shape(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Trains on endless made-up objects; called again it goes on."
+    parser.description = (
+        "Trains on endless made-up objects; called again with the same options it goes on."
+    )
     add = parser.add_argument
     add("--samples", type=int, default=8192, metavar="N", help="objects to make")
     add("--passes", type=float, default=4.0, metavar="P", help="over all of them")
@@ -72,7 +74,9 @@ def _add_flat(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_shadow(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Trains on endless made-up scenes; called again it goes on."
+    parser.description = (
+        "Trains on endless made-up scenes; called again with the same options it goes on."
+    )
     add = parser.add_argument
     add("--scenes", type=int, default=2880, metavar="N", help="to draw, default 2880")
     add("--steps", type=int, default=5000, metavar="N", help="of 32 samples, default 5000")

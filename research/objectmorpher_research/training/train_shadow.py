@@ -11,7 +11,9 @@ import hashlib
 import multiprocessing
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from multiprocessing.process import BaseProcess
 from multiprocessing.queues import Queue
 from pathlib import Path
 from queue import Empty
@@ -33,13 +35,14 @@ from .shadows.samples import ShadowSample, make_sample
 from .shadows.scenes import SceneGeometry, make_geometry, packed, unpacked
 from .shadows.solids import silhouettes
 from .shape_data import make_files, write_arrays
-from .train_shape import follow, schedule
+from .train_shape import checkpoint_of, follow, schedule
 
 SHARD = 64  # scenes in a file, and samples that are handed over at once
 BOARDS, BOARDS_SEED = 160, 5
 OPEN, OTHER_FILE = 8, 0.25  # files of scenes that are at hand; how often one of them is replaced
 RING = 16_000  # samples that are kept
 LEAST = 512  # of them, before anything is learned
+LOOKED = 1.0  # s between two looks at whether those that make samples still do
 RATE, DECAY, STEEPEST = 2e-3, 0.02, 2.0
 GENTLE = 0.35  # x that rate, going on from weights that have learned
 HALF_WAY = 0.5  # from those to the ones that it has learned, is what is exported
@@ -188,12 +191,11 @@ class ShadowState:
         self.mean = {k: v.clone() for k, v in self.net.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.net.parameters(), plan.rate, weight_decay=DECAY)
         self.loss, self.start = 0.0, start
-        if file.exists():
-            kept = torch.load(file, weights_only=True)
-            if kept["plan"] == repr(plan):
-                self.net.load_state_dict(kept["net"])
-                self.optimiser.load_state_dict(kept["optimiser"])
-                self.mean, self.step = kept["mean"], kept["step"]
+        kept = checkpoint_of(file, repr(plan), torch.device("cpu"))
+        if kept is not None:
+            self.net.load_state_dict(kept["net"])
+            self.optimiser.load_state_dict(kept["optimiser"])
+            self.mean, self.step = kept["mean"], kept["step"]
 
     def learn(self, planes: Tensor, fields: Tensor, labels: Tensor) -> ShadowLosses:
         """Take one step."""
@@ -242,7 +244,7 @@ def train(
     """Train in `folder`, for so many minutes at most.
 
     `weights`: exported ones to go on from, more gently. Raises ValueError for those of another
-    network, and for a folder of grounds without pictures.
+    network, for a folder of grounds without pictures, and for one in which another plan was begun.
     """
     photographs(plan.grounds)  # or there are none
     start = None
@@ -250,8 +252,8 @@ def train(
         start = weights_of(weights, ShadowNet())
         digest = hashlib.sha256(weights.read_bytes()).hexdigest()
         plan = replace(plan, start=digest, rate=GENTLE * plan.rate)
-    files = write_scenes(folder / "scenes", plan, part(progress, 0.0, 0.2))
     state = ShadowState(folder / "shadow.pt", plan, start)
+    files = write_scenes(folder / "scenes", plan, part(progress, 0.0, 0.2))
     begun = saved = time.monotonic()
     spawn, rng = (
         multiprocessing.get_context("spawn"),
@@ -271,7 +273,7 @@ def train(
     try:
         ring = SampleRing()
         while state.step < plan.steps and not (minutes and _since(begun) > 60 * minutes):
-            _take(ring, ready)
+            _take(ring, ready, makers)
             state.learn(*ring.drawn(rng, plan.size))
             progress(0.2 + 0.8 * state.step / plan.steps, f"loss {state.loss:.3f}")
             if _since(saved) > SAVED:
@@ -288,15 +290,20 @@ def _since(start: float) -> float:
     return time.monotonic() - start
 
 
-def _take(ring: SampleRing, ready: Queue) -> None:
-    """All that is ready; at the start, as many samples as learning begins with."""
-    while ring.made < LEAST:
-        ring.add(*ready.get())
+def _take(ring: SampleRing, ready: Queue, makers: Sequence[BaseProcess]) -> None:
+    """All that is ready; at the start, as many samples as learning begins with.
+
+    Raises RuntimeError where one of those that make them has ended.
+    """
     while True:
+        if not all(maker.is_alive() for maker in makers):
+            raise RuntimeError("a process that makes samples has ended: its reason stands above")
+        is_enough = ring.made >= LEAST
         try:
-            ring.add(*ready.get_nowait())
+            ring.add(*(ready.get_nowait() if is_enough else ready.get(timeout=LOOKED)))
         except Empty:
-            return
+            if is_enough:
+                return
 
 
 def export(net: ShadowNet, path: Path) -> str:

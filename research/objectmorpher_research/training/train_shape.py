@@ -96,7 +96,8 @@ def train(
     It goes on from `weights`, exported before, where they are given.
 
     Raises ValueError for fewer samples than a step takes, for a seed whose samples others have, for
-    two sets of one seed, and for weights of another network or of families that are held out.
+    two sets of one seed, for weights of another network or of families that are held out, and for a
+    folder in which another plan was begun.
     """
     if plan.samples < plan.size:
         raise ValueError(f"{plan.samples} samples are fewer than the {plan.size} of one step")
@@ -115,6 +116,7 @@ def train(
         start = weights_of(weights, ShapeNet())
         digest = hashlib.sha256(weights.read_bytes()).hexdigest()
         plan = replace(plan, start=digest, rate=GENTLE * plan.rate)
+    state = _State.resumed(folder, plan, start)
     files = [
         file
         for own in plan.sets
@@ -123,7 +125,6 @@ def train(
         )
     ]
     write_shards(folder / "unseen", UNSEEN, CHECKED, progress)
-    state = _State.resumed(folder, plan, start)
     begun = saved = time.monotonic()
     for batch in _endless(files, plan, state.step):
         if state.step >= plan.steps or (minutes and time.monotonic() - begun > 60 * minutes):
@@ -184,12 +185,13 @@ class _State:
 
     @staticmethod
     def resumed(folder: Path, plan: TrainingPlan, start: dict[str, Tensor] | None = None) -> _State:
-        """Resume from the last save of the same plan, or start anew."""
+        """Resume from the last save, or start where there is none.
+
+        Raises ValueError where it is another plan's.
+        """
         state = _State(folder / plan.file, plan, start)
-        kept = None
-        if state.file.exists():
-            kept = torch.load(state.file, map_location=state.device, weights_only=True)
-        if kept is not None and kept["plan"] == json.dumps(asdict(plan)):
+        kept = checkpoint_of(state.file, json.dumps(asdict(plan)), state.device)
+        if kept is not None:
             state.net.load_state_dict(kept["net"])
             state.optimiser.load_state_dict(kept["optimiser"])
             state.mean, state.step, state.history = kept["mean"], kept["step"], kept["history"]
@@ -225,6 +227,18 @@ class _State:
         }  # fmt: skip
         torch.save(kept, partial)
         os.replace(partial, self.file)
+
+
+def checkpoint_of(file: Path, plan: str, device: torch.device) -> dict[str, Any] | None:
+    """What was saved; None where nothing was. Raises ValueError where it is another plan's."""
+    if not file.exists():
+        return None
+    kept = torch.load(file, map_location=device, weights_only=True)
+    if kept["plan"] != plan:
+        raise ValueError(
+            f"{file} was begun with other options: give the same, another folder, or move it away"
+        )
+    return kept
 
 
 def follow(mean: dict[str, Tensor], net: torch.nn.Module, step: int) -> None:

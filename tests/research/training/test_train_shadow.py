@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -129,8 +132,29 @@ def test_grounds_are_parts_of_a_folders_pictures(tmp_path):
     assert sorted(int(image.mean((0, 1)).argmax()) for image in shown) == [0, 2]
     assert Grounds(np.random.default_rng(0), 2, tmp_path).photographs is shown
     (tmp_path / "none").mkdir()
+    for size in ((1, 1), (47, 90), (5000, 200), (3000, 1)):  # too small, or once they are reduced
+        Image.new("RGB", size).save(tmp_path / "none" / f"{size[0]}.png")
+        with pytest.raises(ValueError, match=r"no pictures .* of at least 48 px"):
+            photographs.__wrapped__(tmp_path / "none")
+    Image.new("RGB", (48, 48)).save(tmp_path / "none" / "just.png")
+    shown = photographs.__wrapped__(tmp_path / "none")
+    assert [image.shape for image in shown] == [(48, 48, 3)]
+    assert Grounds(np.random.default_rng(0), 12, tmp_path / "none").photographs
+    (tmp_path / "empty").mkdir()
     with pytest.raises(ValueError, match="no pictures"):
-        photographs(tmp_path / "none")
+        photographs(tmp_path / "empty")
+
+
+def test_who_makes_samples_and_dies_is_not_waited_for(tmp_path):
+    apart = multiprocessing.get_context("fork")
+    ready = apart.Queue(4)
+    (tmp_path / "scenes.npz").write_bytes(b"PK no")
+    rng = np.random.default_rng(0)
+    maker = apart.Process(target=train_shadow._read, args=(rng, [tmp_path / "scenes.npz"]))
+    maker.start()
+    with pytest.raises(RuntimeError, match="a process that makes samples has ended"):
+        train_shadow._take(train_shadow.SampleRing(8), ready, [maker])
+    assert maker.exitcode == 1
 
 
 def test_some_samples_are_seen_from_nearer_and_none_from_farther_away(drawn):
@@ -193,6 +217,11 @@ def test_it_learns_and_runs_without_torch(drawn, tmp_path):
     assert float(after.shade.detach()) < 0.7 * float(before.shade.detach())
     state.save()
     assert train_shadow.ShadowState(state.file, plan).step == state.step == 21
+    before = state.file.read_bytes()
+    for other in (replace(plan, steps=61), replace(plan, seed=1), replace(plan, scenes=1)):
+        with pytest.raises(ValueError, match="begun with other options: give the same"):
+            train_shadow.train(tmp_path, other)
+    assert state.file.read_bytes() == before and not (tmp_path / "scenes").exists()
     net, file = state.trained(), tmp_path / "shadow.onnx"
     train_shadow.export(net, file)
     planes = np.stack([s.planes for s in drawn[:1]])

@@ -116,8 +116,11 @@ def test_stopped_and_resumed_it_is_where_it_was(arrays, tmp_path):
     assert again.step == 2 and len(again.history) == 2
     for name, value in state.net.state_dict().items():
         assert torch.equal(again.net.state_dict()[name], value)
-    other = train_shape._State.resumed(tmp_path, replace(plan, seed=1))
-    assert other.step == 0  # another plan begins anew
+    before = state.file.read_bytes()
+    for other in (replace(plan, seed=1), replace(plan, passes=9), replace(plan, samples=32)):
+        with pytest.raises(ValueError, match="begun with other options: give the same"):
+            train_shape.train(tmp_path, replace(other, samples=32, size=1))
+    assert state.file.read_bytes() == before and not (tmp_path / "unseen").exists()
 
 
 def test_it_runs_without_torch(arrays, tmp_path):
@@ -204,6 +207,9 @@ def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, ca
     shipped = Path(registry.__file__).parent / "shape.onnx"
     going_on = [*words, "--start", str(shipped), "--samples", "16", "--passes", "1",
                 "--also", "3:16", "-o", str(tmp_path / "next.onnx")]  # fmt: skip
+    assert main(going_on) == 1
+    assert "begun with other options" in capsys.readouterr().err
+    (tmp_path / "checkpoint.pt").unlink()
     assert main(going_on) == 0
     told = json.loads((tmp_path / "next.json").read_text(encoding="utf-8"))
     assert told["steps"] == 2

@@ -29,7 +29,7 @@ class LoraPlan:
     warm_up: int = 0  # steps in which the rates rise; not told
     steepest: float = 1.0  # length of a gradient that is not shortened; not told
     mean: float = 0.0  # of the moving mean of weights, as 0.999; 0: none
-    held_out: int = 4  # triplets that are not trained on, but looked at
+    held_out: int = 4  # triplets that are not trained on, but looked at; even: whole pairs
     number: str = "bfloat16"
     seed: int = 0
     base: str = "whole"  # of BASES
@@ -53,7 +53,7 @@ class LoraPlan:
             raise TrainingError("the number of triplets held out is not negative")
 
     def facts(self, triplets: tuple[Stored, ...], weights: str) -> dict[str, Any]:
-        """Plain values that a training keeps while it goes on; with what it is trained on."""
+        """Plain values that a training keeps while it goes on; `triplets`: it is trained on."""
         of = hashlib.sha256("".join(t.content for t in triplets).encode()).hexdigest()
         return {**asdict(self), "triplets": of, "weights": weights}
 
@@ -63,13 +63,20 @@ def parted(
 ) -> tuple[tuple[Stored, ...], tuple[Stored, ...]]:
     """Split triplets for training from those held out, by content, stable when some are added.
 
-    Raises TrainingError where none is left.
+    A pair's two directions stand together, and what shows a photograph of those held out, as the
+    next frame of a video does, is in neither part. Raises TrainingError where none is left.
     """
-    order = sorted(triplets, key=lambda t: hashlib.sha256(t.content.encode()).hexdigest())
-    aside = set(order[: plan.held_out])
-    left = tuple(t for t in triplets if t not in aside)
+
+    def place(one: Stored) -> tuple[str, str]:
+        pair = hashlib.sha256(b"".join(sorted(one.photographed))).hexdigest()
+        return pair, one.content
+
+    aside = set(sorted(triplets, key=place)[: plan.held_out])
+    seen = frozenset().union(*(one.photographed for one in aside))
+    left = tuple(t for t in triplets if not seen & t.photographed)
     if not left:
         raise TrainingError(
-            f"{len(triplets)} triplets are too few to hold {plan.held_out} of them out"
+            f"{len(triplets)} triplets are too few to hold {plan.held_out} of them out,"
+            " and what shows a photograph of theirs"
         )
     return left, tuple(t for t in triplets if t in aside)

@@ -88,7 +88,7 @@ class Trainer:
         own = {name: p.detach().clone() for name, p in self.parameters.items()}
         self.mean = own if plan.mean else None
         weights = weights_fingerprint(places.weights, ("transformer",))
-        self._facts = plan.facts(everything, weights)
+        self._facts = plan.facts(self.trained_on, weights)
         self.state = TrainingState(self.parameters, self.optimiser, self.mean)
         self.step = self.state.load(places.out, self._facts)
 

@@ -38,10 +38,17 @@ class Stored:
     @cached_property
     def content(self) -> str:
         """SHA-256 of its pictures' files."""
-        told = hashlib.sha256()
-        for picture in PICTURES:
-            told.update(hashlib.sha256(self._bytes(picture)).digest())
-        return told.hexdigest()
+        return hashlib.sha256(b"".join(self._hashes)).hexdigest()
+
+    @property
+    def photographed(self) -> frozenset[bytes]:
+        """SHA-256 of the files of B and A, which other triplets may show as well."""
+        b, _, a = self._hashes
+        return frozenset((b, a))
+
+    @cached_property
+    def _hashes(self) -> tuple[bytes, ...]:
+        return tuple(hashlib.sha256(self._bytes(picture)).digest() for picture in PICTURES)
 
     def _bytes(self, picture: str) -> bytes:
         at = self.file(picture)

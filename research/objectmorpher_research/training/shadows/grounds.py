@@ -39,13 +39,16 @@ SUFFIXES = (".jpg", ".jpeg", ".png")
 def photographs(folder: Path | None = None) -> tuple[F32, ...]:
     """(h, w, 3) linear: the pictures of a folder, or those of PHOTOGRAPHS that are here.
 
-    Raises ValueError for a folder without pictures.
+    Those of which no part can be taken are left out. Raises ValueError for a folder without others.
     """
     if folder is not None:
         files = sorted(f for f in folder.rglob("*") if f.suffix.lower() in SUFFIXES)
-        if not files:
-            raise ValueError(f"{folder} holds no pictures ({', '.join(SUFFIXES)})")
-        return tuple(_linear(np.asarray(Image.open(file).convert("RGB"))) for file in files)
+        found = (_linear(np.asarray(Image.open(file).convert("RGB"))) for file in files)
+        large = tuple(image for image in found if min(image.shape[:2]) >= SMALLEST)
+        if not large:
+            kinds = ", ".join(SUFFIXES)
+            raise ValueError(f"{folder} holds no pictures ({kinds}) of at least {SMALLEST} px")
+        return large
     shown = []
     for name in PHOTOGRAPHS:
         try:
@@ -56,7 +59,8 @@ def photographs(folder: Path | None = None) -> tuple[F32, ...]:
 
 
 def _linear(image: RGB) -> F32:
-    scale = min(LONGEST / max(image.shape[:2]), 1.0)
+    longer, shorter = max(image.shape[:2]), min(image.shape[:2])
+    scale = max(min(LONGEST / longer, 1.0), 1 / shorter)  # it has a row of pixels at least
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return np.asarray((small / 255.0) ** GAMMA, np.float32)
 
@@ -66,7 +70,7 @@ def _photographed(rng: np.random.Generator, shown: tuple[F32, ...]) -> F64:
     whole = shown[rng.integers(len(shown))]
     height, width = whole.shape[:2]
     most = min(height, width)
-    side = int(np.exp(rng.uniform(*np.log([min(SMALLEST, most - 1), most]))))
+    side = int(np.exp(rng.uniform(*np.log([SMALLEST, most]))))
     start = rng.integers(width - side + 1), rng.integers(height - side + 1)
     unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     slant = rng.uniform(-0.22, 0.22, (4, 2)) if rng.random() < OBLIQUE else np.zeros((4, 2))

@@ -1,4 +1,7 @@
-"""A shard is there whole or not at all, once, and a folder is gone on with only as it was begun."""
+"""A shard is there whole or not at all, once, and a folder is gone on with only as it was begun.
+
+What of its triplets is held out is not trained on in any other way either.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import os
 import signal
 import time
 from dataclasses import replace
+from itertools import pairwise
 
 import made_up
 import numpy as np
@@ -15,6 +19,7 @@ import pytest
 
 from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_research.training.composition import TrainingError
+from objectmorpher_research.training.composition.lora_plan import LoraPlan, parted
 from objectmorpher_research.training.composition.shards import (
     SHARD,
     UNFINISHED,
@@ -25,7 +30,8 @@ from objectmorpher_research.training.composition.shards import (
     write_shard,
 )
 from objectmorpher_research.training.composition.triplet import TripletPlan
-from objectmorpher_research.training.composition.triplet_folder import triplets_in
+from objectmorpher_research.training.composition.triplet_folder import Stored, triplets_in
+from tests.tree import quick
 
 PARTS = shards_of(made_up.pairs(7), 3)
 HOW = TripletPlan()
@@ -50,6 +56,37 @@ def test_triplets_come_back_as_they_were_made(tmp_path):
     found = finish(out, shards_of(made_up.pairs(7), 3))
     assert (found["made"], found["rejected"]) == (5, 2)
     assert found["reasons"] == {"every third is rejected": 2}
+
+
+def stored(folder, photographs):
+    """Triplets of photographs (B, A), which are bytes."""
+    found = []
+    for k, (b, a) in enumerate(photographs):
+        found.append(Stored(f"t{k}", folder))
+        for picture, data in (("b", b), ("coarse", b"%d" % k), ("a", a)):
+            found[-1].file(picture).write_bytes(data)
+    return tuple(found)
+
+
+@pytest.mark.parametrize("seed", quick(range(12), 4))
+def test_no_photograph_of_what_is_held_out_is_trained_on(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    taken = [rng.bytes(9) for _ in range(40)]
+    two = list(zip(taken[::2], taken[1::2], strict=True))  # pictures of 20 things
+    frames = list(pairwise(taken))  # of a video
+    for pairs, loses in ((two, False), (frames, True)):
+        both_ways = [way for b, a in pairs for way in ((b, a), (a, b))]
+        triplets = stored(tmp_path, [both_ways[k] for k in rng.permutation(len(both_ways))])
+        for held_out in (0, 1, 4, 6):
+            left, aside = parted(triplets, LoraPlan(held_out=held_out))
+            assert len(aside) == held_out and not set(left) & set(aside)
+            shown = {one.file(side).read_bytes() for one in aside for side in "ba"}
+            assert not shown & {one.file(side).read_bytes() for one in left for side in "ba"}
+            assert len(shown) == 2 * -(-held_out // 2) or loses
+            if held_out % 2 == 0 and not loses:
+                assert len(left) + len(aside) == len(triplets), "whole pairs"
+            again = parted(triplets[::-1], LoraPlan(held_out=held_out))
+            assert {one.name for one in again[1]} == {one.name for one in aside}
 
 
 def test_a_shard_that_does_not_say_what_it_holds_is_refused(tmp_path):
