@@ -106,8 +106,9 @@ def _beyond(deformer: Deformer, nodes: list[int], reach: float) -> I32:
 
 # A locked object is kept from changes by a slip.
 
-OF_A_ROW = ("name", "is_visible", "is_locked", "layer")  # what also a locked object may change in
-KEPT = tuple(f.name for f in fields(EditObject) if f.name not in OF_A_ROW)
+# What also a locked object may change in; what it is in a key pose changes nothing of it now.
+FREE = ("name", "is_visible", "is_locked", "layer", "keys")
+KEPT = tuple(f.name for f in fields(EditObject) if f.name not in FREE)
 
 
 def set_locked(document: Document, k: int, is_locked: bool) -> Document:
@@ -118,7 +119,8 @@ def set_locked(document: Document, k: int, is_locked: bool) -> Document:
 def locked_change(before: Document, after: Document) -> EditObject | None:
     """The locked object of `before` that is changed or gone in `after`, if there is one.
 
-    Its name, whether it is shown, and which others it covers are not kept from change.
+    Its name, whether it is shown, which others it covers, and its key poses are not kept from
+    change.
     """
     locked = (own for own in before.objects if own.is_locked)
     return next((own for own in locked if not any(_is_same(own, o) for o in after.objects)), None)
