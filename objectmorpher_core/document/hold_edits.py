@@ -38,6 +38,11 @@ def stays_of(item: EditObject) -> Stays:
     return Stays.FAR if item.has_auto_anchors else Stays.NOTHING
 
 
+def keeps_pose(item: EditObject) -> bool:
+    """Whether its pose stays as it is where its handles, or what is frozen, do not give it."""
+    return item.base.pose is not None or (not item.handles and item.rig.shifts is None)
+
+
 def set_stays(document: Document, k: int, deformer: Deformer, stays: Stays) -> Document:
     """Object `k` as it is; from now on this of it stays by itself."""
     item = document.objects[k]

@@ -90,6 +90,17 @@ def with_keys(document: Document, moments: Sequence[Document]) -> Document:
     return replace(document, objects=objects)
 
 
+def with_keys_again(document: Document, k: int, again: Callable[[Document], Document]) -> Document:
+    """Object `k`, whose shape is another one, with the key poses that `again` makes of its pose."""
+    item = document.objects[k]
+
+    def made(key: KeyPose) -> KeyPose:
+        there = again(document.with_object(k, _posed(item, key))).objects[k]
+        return replace(key, handles=there.handles, pose=there.pose, base=there.base)
+
+    return document.with_object(k, replace(item, keys=tuple(map(made, item.keys))))
+
+
 def is_at_key(document: Document, number: int) -> bool:
     """Whether the objects are as they are in key pose `number`, from 0."""
     return off_key(document, number) is None
