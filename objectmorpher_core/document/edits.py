@@ -426,12 +426,12 @@ def rename(document: Document, k: int, name: str) -> Document:
 
 
 def duplicate(document: Document, k: int) -> Document:
-    """A copy of object `k` after all others, where the object is; arrays and plate stay."""
+    """A copy of object `k` after all others, where it is, without key poses; the plate stays."""
     item = document.objects[k]
     if item.lifted is None:
         raise EditError("lift the object before making a copy of it")
     name, taken = f"{COPY.sub('', item.name)} copy", {o.name for o in document.objects}
-    copy = replace(item, name=free_name(name, taken) if name in taken else name)
+    copy = replace(item, keys=(), name=free_name(name, taken) if name in taken else name)
     return replace(document, objects=(*document.objects, copy), refined=None)
 
 

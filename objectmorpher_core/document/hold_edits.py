@@ -38,6 +38,11 @@ def stays_of(item: EditObject) -> Stays:
     return Stays.FAR if item.has_auto_anchors else Stays.NOTHING
 
 
+def keeps_pose(item: EditObject) -> bool:
+    """Whether its pose stays as it is where its handles, or what is frozen, do not give it."""
+    return item.base.pose is not None or (not item.handles and item.rig.shifts is None)
+
+
 def set_stays(document: Document, k: int, deformer: Deformer, stays: Stays) -> Document:
     """Object `k` as it is; from now on this of it stays by itself."""
     item = document.objects[k]
@@ -106,8 +111,9 @@ def _beyond(deformer: Deformer, nodes: list[int], reach: float) -> I32:
 
 # A locked object is kept from changes by a slip.
 
-OF_A_ROW = ("name", "is_visible", "is_locked", "layer")  # what also a locked object may change in
-KEPT = tuple(f.name for f in fields(EditObject) if f.name not in OF_A_ROW)
+# What also a locked object may change in; what it is in a key pose changes nothing of it now.
+FREE = ("name", "is_visible", "is_locked", "layer", "keys")
+KEPT = tuple(f.name for f in fields(EditObject) if f.name not in FREE)
 
 
 def set_locked(document: Document, k: int, is_locked: bool) -> Document:
@@ -118,7 +124,8 @@ def set_locked(document: Document, k: int, is_locked: bool) -> Document:
 def locked_change(before: Document, after: Document) -> EditObject | None:
     """The locked object of `before` that is changed or gone in `after`, if there is one.
 
-    Its name, whether it is shown, and which others it covers are not kept from change.
+    Its name, whether it is shown, which others it covers, and its key poses are not kept from
+    change.
     """
     locked = (own for own in before.objects if own.is_locked)
     return next((own for own in locked if not any(_is_same(own, o) for o in after.objects)), None)

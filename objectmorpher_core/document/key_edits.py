@@ -6,14 +6,15 @@ later, or anew, has the pose that it has now wherever it has no key pose of its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import same_values
+from ..base.arrays import F64, same_values
 from .edits import EditError
 from .model import Document, EditObject, KeyPose
+from .pose import Pose
 
 MOST = 12
 
@@ -51,10 +52,32 @@ def remove_key(document: Document, number: int) -> Document:
 
 def at_key(document: Document, number: int) -> Document:
     """Every object as it is in key pose `number`, from 0."""
-    for k, item in enumerate(document.objects):
-        if number < len(item.keys):
-            document = document.with_object(k, _posed(item, item.keys[number]))
+    return _at_key(document, number, range(len(document.objects)))
+
+
+def free_at_key(document: Document, number: int) -> Document:
+    """The same, but for what is locked: it stays as it is."""
+    free = [k for k, item in enumerate(document.objects) if not item.is_locked]
+    return _at_key(document, number, free)
+
+
+def _at_key(document: Document, number: int, chosen: Iterable[int]) -> Document:
+    for k in chosen:
+        item = document.objects[k]
+        if number >= len(item.keys):
+            continue
+        now, key = _now(item), item.keys[number]
+        if not (_is_same(now, key) and same_values(now.base, key.base)):
+            document = document.with_object(k, _posed(item, key))
     return document
+
+
+def off_key(document: Document, number: int) -> int | None:
+    """The first object that is not as it is in key pose `number`, from 0; None: all are."""
+    for k, item in enumerate(document.objects):
+        if number < len(item.keys) and not _is_same(_now(item), item.keys[number]):
+            return k
+    return None
 
 
 def with_keys(document: Document, moments: Sequence[Document]) -> Document:
@@ -67,13 +90,20 @@ def with_keys(document: Document, moments: Sequence[Document]) -> Document:
     return replace(document, objects=objects)
 
 
+def with_keys_again(document: Document, k: int, again: Callable[[Document], Document]) -> Document:
+    """Object `k`, whose shape is another one, with the key poses that `again` makes of its pose."""
+    item = document.objects[k]
+
+    def made(key: KeyPose) -> KeyPose:
+        there = again(document.with_object(k, _posed(item, key))).objects[k]
+        return replace(key, handles=there.handles, pose=there.pose, base=there.base)
+
+    return document.with_object(k, replace(item, keys=tuple(map(made, item.keys))))
+
+
 def is_at_key(document: Document, number: int) -> bool:
     """Whether the objects are as they are in key pose `number`, from 0."""
-    return all(
-        _is_same(_now(item), item.keys[number])
-        for item in document.objects
-        if number < len(item.keys)
-    )
+    return off_key(document, number) is None
 
 
 def _now(item: EditObject) -> KeyPose:
@@ -82,13 +112,23 @@ def _now(item: EditObject) -> KeyPose:
 
 
 def _posed(item: EditObject, key: KeyPose) -> EditObject:
-    """What was frozen since, or is not any more, is where it is at rest."""
+    """What was frozen since stays where it is in the key pose."""
     was, held = key.held, item.rig.held
     is_alike = was is not None and held is not None and np.array_equal(was, held)
+    shifts = key.shifts if is_alike else _shifts(item, key.pose)
     return replace(
         item, handles=key.handles, pose=key.pose, placement=key.placement, base=key.base,
-        rig=replace(item.rig, shifts=key.shifts if is_alike else None),
+        rig=replace(item.rig, shifts=shifts),
     )  # fmt: skip
+
+
+def _shifts(item: EditObject, pose: Pose | None) -> F64 | None:
+    """(P, 3) object units, from rest, of what is frozen where `pose` has it; None: at rest."""
+    held = item.rig.held
+    if pose is None or held is None or item.lifted is None:
+        return None
+    shifts = pose.points[held] - item.lifted.control_points[held]
+    return shifts if shifts.any() else None
 
 
 def _is_same(one: KeyPose, other: KeyPose) -> bool:

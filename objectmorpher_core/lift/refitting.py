@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .. import compose
-from ..base.arrays import F32, F64, Mask, Pixels, Selection, crop
+from ..base.arrays import F32, F64, I32, Mask, Pixels, Selection, crop
 from ..base.camera import Camera
 from ..base.progress import Progress, part, silent
 from ..base.rotations import matrices_from_quats, quats_from_matrices
@@ -21,6 +21,7 @@ from ..compose.plate.plate import plate_cover
 from ..compose.plate.repair import Uncovering, refitted_plate
 from ..deform.control_points import MIN_COUNT, with_more_points
 from ..document.gaussians import Gaussians
+from ..document.hold_edits import keeps_pose
 from ..document.model import (
     Document,
     EditObject,
@@ -35,6 +36,7 @@ from ..document.model import (
 )
 from ..document.paint import Paint
 from ..document.pose import Base, Pose
+from ..document.rig import Rig
 from ..document.sides import Sides
 from ..document.transparency import continued
 from ..pictures.image import Picture
@@ -63,25 +65,59 @@ OTHER_SIDE = 1e6  # px: the far side of the object is farther than anything on t
 def carried_over(
     item: EditObject, matte: Matte, lifted: LiftedObject, shape: LiftSettings
 ) -> EditObject:
-    """`item` with another lift of the same mask; no pose: it has to be solved anew.
+    """`item` with another lift of the same mask.
 
-    Of two handles that would share a control point the later one is gone.
+    Its pose goes over where no handle gives it, or not they alone. Else there is none: it has to
+    be solved anew. So has that of a key pose, which goes over in any case. Of two handles that
+    would share a control point the later one is gone.
     """
     changed = item.with_lifted(_repainted(matte, item, lifted), lifted, shape)
     old = item.lifted
     if old is None:
         return changed
-    handles: list[Handle] = []
-    for handle in item.handles:
-        moved = _carried(handle, old, lifted)
-        if all(other.control_point != moved.control_point for other in handles):
-            handles.append(moved)
     before = KDTree(_seen_at(old, old.control_points))
-    nearest = np.asarray(before.query(_seen_at(lifted, lifted.control_points))[1])
-    rig = item.rig.moved_to(nearest)
-    if rig.shifts is not None:
-        rig = replace(rig, shifts=rig.shifts * (old.scale / lifted.scale))
-    return replace(changed, handles=tuple(handles), rig=rig)
+    count = min(GUIDES, len(old.control_points))
+    gaps, nearest = before.query(_seen_at(lifted, lifted.control_points), k=count)
+    gaps, nearest = gaps.reshape(len(gaps), -1), nearest.reshape(len(gaps), -1)
+    rest = old.object_points(lifted.world_points(lifted.control_points.astype(np.float64)))
+
+    def moved(pose: Pose | None) -> Pose | None:
+        if pose is None:
+            return None
+        led = _led(rest, old, pose, gaps, nearest)
+        return Pose(lifted.object_points(old.world_points(led.points)), led.rotations)
+
+    def handled(handles: tuple[Handle, ...]) -> tuple[Handle, ...]:
+        kept: dict[int, Handle] = {}
+        for handle in (_carried(each, old, lifted) for each in handles):
+            kept.setdefault(handle.control_point, handle)
+        return tuple(kept.values())
+
+    def rigged(rig: Rig) -> Rig:
+        rig = rig.moved_to(nearest[:, 0])
+        if rig.shifts is None:
+            return rig
+        return replace(rig, shifts=rig.shifts * (old.scale / lifted.scale))
+
+    def based(base: Base) -> Base:
+        return Base(moved(base.pose), handled(base.handles), _among(nearest[:, 0], base.anchors))
+
+    def kept(key: KeyPose) -> KeyPose:
+        rig = rigged(replace(item.rig, held=key.held, shifts=key.shifts))
+        return KeyPose(
+            handled(key.handles), moved(key.pose), key.placement, rig.held, rig.shifts,
+            based(key.base),
+        )  # fmt: skip
+
+    return replace(
+        changed, handles=handled(item.handles), rig=rigged(item.rig), base=based(item.base),
+        pose=moved(item.pose) if keeps_pose(item) else None, keys=tuple(map(kept, item.keys)),
+    )  # fmt: skip
+
+
+def _among(nearest: np.ndarray, region: I32 | None) -> I32 | None:
+    """Those control points whose `nearest` (M,) old ones are in a region of the old ones."""
+    return None if region is None else np.flatnonzero(np.isin(nearest, region)).astype(np.int32)
 
 
 def refitted(item: EditObject, matte: Matte, lifted: LiftedObject, camera: Camera) -> EditObject:
@@ -99,8 +135,7 @@ def refitted(item: EditObject, matte: Matte, lifted: LiftedObject, camera: Camer
         return None if pose is None else _pose_of(rest, old, pose, gaps, nearest)
 
     def based(base: Base) -> Base:
-        is_anchor = None if base.anchors is None else np.isin(nearest[:, 0], base.anchors)
-        anchors = None if is_anchor is None else np.flatnonzero(is_anchor).astype(np.int32)
+        anchors = _among(nearest[:, 0], base.anchors)
         return Base(moved(base.pose), _held(base.handles, lifted), anchors)
 
     def kept(key: KeyPose) -> KeyPose:
@@ -157,9 +192,19 @@ def _held(handles: tuple[Handle, ...], lifted: LiftedObject) -> tuple[Handle, ..
 def _pose_of(
     rest: F64, old: LiftedObject, pose: Pose, gaps: np.ndarray, nearest: np.ndarray
 ) -> Pose:
+    """The pose that is `_led`; a control point that was there before is exactly where it was."""
+    led = _led(rest, old, pose, gaps, nearest)
+    points, rotations = led.points.copy(), led.rotations.copy()
+    is_old = gaps[:, 0] == 0
+    points[is_old] = pose.points[nearest[is_old, 0]]
+    rotations[is_old] = pose.rotations[nearest[is_old, 0]]
+    return Pose(points, rotations)
+
+
+def _led(rest: F64, old: LiftedObject, pose: Pose, gaps: np.ndarray, nearest: np.ndarray) -> Pose:
     """The pose of control points at `rest` (M, 3), as their `nearest` (M, G) old ones move.
 
-    One that was there before is exactly where it was; `gaps` (M, G) object units.
+    It is in the old object's frame; the nearer one is, by the `gaps` (M, G), the more it leads.
     """
     weights = 1.0 / np.maximum(gaps, 1e-9) ** 2
     weights /= weights.sum(1, keepdims=True)
@@ -170,11 +215,7 @@ def _pose_of(
     quats = quats_from_matrices(pose.rotations)[nearest]
     quats *= np.where((quats * quats[:, :1]).sum(2, keepdims=True) < 0, -1.0, 1.0)
     mean = (weights[..., None] * quats).sum(1)
-    rotations = matrices_from_quats(mean / np.linalg.norm(mean, axis=1, keepdims=True))
-    is_old = gaps[:, 0] == 0
-    points[is_old] = pose.points[nearest[is_old, 0]]
-    rotations[is_old] = pose.rotations[nearest[is_old, 0]]
-    return Pose(points, rotations)
+    return Pose(points, matrices_from_quats(mean / np.linalg.norm(mean, axis=1, keepdims=True)))
 
 
 def _same_motion(

@@ -18,6 +18,7 @@ from objectmorpher.tools.place_tool import PlaceTool
 from objectmorpher_core import splat_files
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.key_edits import is_at_key
 from objectmorpher_core.document.model import Document, LiftedObject, Placement, Prompt
 from objectmorpher_core.segment.mask_edit import is_selected
 from objectmorpher_core.session.file import decode_session, encode_session
@@ -87,6 +88,48 @@ def test_a_posed_object_stays_posed_when_it_becomes_thicker(editor: Editor, ball
         thing.pose.points[handle.control_point] - thing.lifted.control_points[handle.control_point]
     )
     assert reached[0] * thing.lifted.scale == pytest.approx(0.2 * scale, rel=0.2)
+
+
+def test_key_poses_and_what_no_handle_holds_are_there_in_another_shape(
+    editor: Editor, ball: Document
+) -> None:
+    """Key poses are solved as the pose of now is, so that it is in the same one as before."""
+    editor.start(ball)
+    here = editor.posing.surface_at(editor.view.canvas_from_image(np.array(CENTRE)))
+    assert here is not None and editor.document is not None
+    editor.apply("Add handle", edits.add_handle(editor.document, 0, here.rest))
+    for far in (0.2, -0.1):
+        target = here.rest + np.array([far, 0.0, 0.0])
+        changed = edits.move_handle(editor.committed, 0, 0, target)
+        editor.apply("Move handle", editor.derived.solved(changed, 0, None))
+        editor.keying.add()
+    editor.posing.select_all()
+    editor.posing.remove()
+    editor.keying.add()
+    for number in range(3):
+        editor.keying.show(number)
+        far = _displaced(editor)
+        editor.shaping.preview_thickness(1.1)
+        editor.shaping.end_thickness()
+        assert editor.keying.count == 3 and editor.keying.shown == number
+        assert _displaced(editor) == pytest.approx(far, rel=0.15)
+        shown = editor.committed
+        editor.keying.step(1)
+        editor.keying.show(number)
+        assert is_at_key(editor.committed, number)
+        assert np.array_equal(editor.object.pose.points, shown.objects[0].pose.points)
+        editor.shaping.preview_thickness(1.0)
+        editor.shaping.end_thickness()
+        assert _displaced(editor) == pytest.approx(far, rel=1e-3)
+
+
+def _displaced(editor: Editor) -> float:
+    """World units: the mean way of the control points from where they rest, with its sign."""
+    thing = editor.object
+    assert thing is not None and thing.lifted is not None and thing.pose is not None
+    return float(
+        (thing.pose.points - thing.lifted.control_points)[:, 0].mean() * thing.lifted.scale
+    )
 
 
 @pytest.mark.slow

@@ -295,6 +295,24 @@ def test_key_poses_are_kept_changed_and_saved():
         add_key(document)
 
 
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_what_was_frozen_later_stays_where_a_key_pose_has_it(share):
+    """Of the side where the handle is: also when that is dragged on from there."""
+    document = add_key(edited())
+    item, points = document.objects[0], shapes.scene("ellipse").lifted.control_points
+    gaps = np.linalg.norm(points - points[7], axis=1)
+    frozen = np.argsort(gaps)[1 : round(share * len(points))]
+    there = at_key(edits.freeze(edits.set_pose(document, 0, None), 0, frozen), 0)
+    handle = there.objects[0].handles[0]
+    pulled = edits.move_handle(there, 0, 0, handle.target + (0.05, 0.0, 0.0)).objects[0]
+    deformer = shapes.scene("ellipse").puppet.deformer.with_rig(pulled.rig)
+    found = deformer.solve(pulled.handles, pulled.footing).pose.points[frozen]
+    assert np.abs(found - item.pose.points[frozen]).max() < 1e-9
+    at_rest = replace(item.keys[0], handles=(), pose=None)
+    resting = at_key(there.with_object(0, replace(there.objects[0], keys=(at_rest,))), 0)
+    assert resting.objects[0].rig.shifts is None
+
+
 def test_a_session_with_key_poses_of_another_object_is_refused():
     document = add_key(edited())
     item = document.objects[0]

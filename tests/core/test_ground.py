@@ -10,6 +10,7 @@ import pytest
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import (
     CAMERA_GIMBAL,
+    matrix_from_vector,
     turn_about,
     turn_matrix,
     turn_of,
@@ -179,6 +180,43 @@ def test_the_foot_of_what_stands_stays_where_it_touches(scene, turn):
     size = scene.lifted.diameter * scene.lifted.scale
     assert np.linalg.norm(kept - before) < PLANE * size
     assert np.linalg.norm(moved - before) > 0.05 * size
+
+
+def _dish(height: float, base: float, tilt: float, towards: float) -> np.ndarray:
+    """(N, 3) a round dish, one unit wide, that is `base` units wide where it stands.
+
+    It is taken to be tilted by `tilt` degrees, one direction of many.
+    """
+    rng = np.random.default_rng(0)
+    radius, angle = 0.5 * np.sqrt(rng.random(2000)), rng.uniform(0, 2 * np.pi, 2000)
+    rise = height * np.clip((radius - base / 2) / (0.5 - base / 2), 0, None)
+    points = np.column_stack([radius * np.cos(angle), -rise, radius * np.sin(angle)])
+    axis = np.array([np.cos(towards), 0.0, np.sin(towards)])
+    return points @ matrix_from_vector(np.radians(tilt) * axis).T + [0, 0, 3]
+
+
+@over("tilt", [0.0, 3.0, 8.0, 14.0, 20.0])
+@over("base", [0.35, 0.6])
+@over("height", [0.15, 0.3])
+def test_what_is_shallow_stays_where_it_is_however_wrong_its_tilt_is(scene, height, base, tilt):
+    """It lies on one side of its rim then, which it would not turn about."""
+    lifted = replace(scene.lifted, stands=True)
+    for towards in np.radians(np.arange(0, 360, 40)):
+        points = _dish(height, base, tilt, towards)
+        foot = foot_of(Placement(), points, lifted, scene.camera, DOWN)
+        middle = 0.5 * (points.min(0) + points.max(0))
+        assert np.hypot(*(foot - middle)[[0, 2]]) < 0.15
+        assert foot[1] > points[:, 1].max() - 0.04 * np.ptp(points[:, 1])
+
+
+@over("tilt", [0.0, 3.0, 8.0])
+def test_what_is_tall_stands_on_its_contact_also_where_it_leans(scene, tilt):
+    lifted = replace(scene.lifted, stands=True)
+    for towards in np.radians(np.arange(0, 360, 40)):
+        points = _dish(2.0, 0.35, tilt, towards)
+        lowest = points[points[:, 1] > points[:, 1].max() - 0.04 * np.ptp(points[:, 1])]
+        foot = foot_of(Placement(), points, lifted, scene.camera, DOWN)
+        np.testing.assert_allclose(foot, 0.5 * (lowest.min(0) + lowest.max(0)), atol=EXACT)
 
 
 @over("stands", [True, False])

@@ -15,7 +15,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Pixels, Sparse, crop
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.document import edits, hold_edits
+from objectmorpher_core.document import edits, hold_edits, key_edits
 from objectmorpher_core.document.model import (
     Document,
     EditObject,
@@ -291,6 +291,16 @@ class Derived:
         deformer = self.deformer(document, k)
         solution = deformer.solve(thing.handles, thing.footing, start, **effort)
         return edits.set_pose(document, k, solution.pose)
+
+    def posed_again(self, document: Document, k: int) -> Document:
+        """Object `k` of another shape in the pose that went over, or in that of its handles."""
+        item = document.objects[k]
+        is_over = item.pose is not None and hold_edits.keeps_pose(item)
+        return self.held(document, k) if is_over else self.solved(document, k, None)
+
+    def keys_again(self, document: Document, k: int) -> Document:
+        """Object `k` of another shape, with its key poses as `posed_again` makes them."""
+        return key_edits.with_keys_again(document, k, lambda there: self.posed_again(there, k))
 
     def deformer(self, document: Document, k: int) -> Deformer:
         """Return the solver of object `k`'s pose."""

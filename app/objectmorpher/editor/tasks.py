@@ -320,7 +320,8 @@ class Tasks:
             if wish.label is None:
                 self._show_lift(now, k)
             else:
-                editor.apply(wish.label, editor.derived.solved(now, k, None))
+                derived = editor.derived
+                editor.apply(wish.label, derived.keys_again(derived.posed_again(now, k), k))
             self._end_lift(k, wish)
 
         def drop() -> None:

@@ -79,6 +79,36 @@ def test_it_cannot_be_pointed_at_and_the_others_can_be_changed(locked: Editor) -
     assert editor.object.placement.move == (-50.0, 5.0)
 
 
+def test_key_poses_are_kept_and_shown_of_the_others(locked: Editor) -> None:
+    """What is locked stays in its place, and does not keep them from theirs."""
+    editor = locked
+    editor.objects.choose(1)
+    places = [editor.object.placement.move, (-50.0, 5.0)]
+    editor.keying.add()
+    editor.placing.move_to(Placement(move=places[1]))
+    editor.commit("Move object")
+    editor.keying.add()
+    assert editor.keying.count == 2 and editor.keying.shown == 1
+    editor.message = None
+    for number in (0, 1):
+        editor.keying.step(1)
+        assert editor.keying.shown == number and editor.object.placement.move == places[number]
+        assert editor.message is None
+    editor.keying.replace()
+    editor.lock(0)
+    document = edits.set_placement(editor.committed, 0, Placement(move=(9.0, 0.0)))
+    editor.apply("Move object", document)
+    editor.lock(0)
+    editor.keying.show(0)
+    moves = [item.placement.move for item in editor.committed.objects]
+    assert moves == [(9.0, 0.0), places[0]]
+    assert "locked" in editor.message.text and editor.message.action is not None
+    steps = editor.history.steps
+    editor.keying.show(0)
+    editor.keying.remove()
+    assert editor.history.steps == (*steps, "Remove key pose 1") and editor.keying.count == 1
+
+
 def test_its_button_unlocks_it_and_undo_covers_both(locked: Editor) -> None:
     editor, before = locked, locked.committed
     run(editor, "remove_object")

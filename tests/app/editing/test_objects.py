@@ -51,6 +51,22 @@ def test_a_copy_is_one_step_and_becomes_current(editor: Editor, ball: Document) 
     assert editor.view.tool is ToolName.PLACE
 
 
+def test_a_copy_stays_where_it_is_while_the_original_goes_through_its_key_poses(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    editor.keying.add()
+    editor.placing.move_to(Placement(move=(20.0, 0.0)))
+    editor.commit("Move object")
+    editor.keying.add()
+    run(editor, "duplicate")
+    editor.placing.move_to(Placement(move=(-40.0, 0.0)))
+    editor.commit("Move object")
+    for place in (0.0, 20.0):
+        editor.keying.step(1)
+        assert [item.placement.move[0] for item in editor.committed.objects] == [place, -40.0]
+
+
 def test_the_export_of_a_moved_copy_keeps_the_object(
     copied: Editor, ball: Document, tmp_path: Path
 ) -> None:

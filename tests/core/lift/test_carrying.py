@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
-from objectmorpher_core.document.model import Document, LiftedObject, LiftSettings
+from objectmorpher_core.document.key_edits import add_key
+from objectmorpher_core.document.model import Document, LiftedObject, LiftSettings, Placement
+from objectmorpher_core.document.pose import Base, Pose
 from objectmorpher_core.document.rig import Rig
 from objectmorpher_core.pipeline import lift_mask
 from tests import shapes
@@ -176,10 +179,66 @@ def test_there_and_back_is_the_same_edit(thickness):
     assert np.array_equal(before.objects[0].rig.held, back.objects[0].rig.held)
 
 
-def test_the_pose_is_gone_and_the_settings_are_told():
+def test_the_pose_of_handles_is_gone_and_the_settings_are_told():
     after = edits.set_thickness(_with_handles(_document(), True), 0, 1.4)
     assert after.objects[0].pose is None
     assert after.objects[0].shape.thickness == 1.4
+
+
+TURN = turn_matrix(40.0, -25.0, 60.0)
+
+
+def _moved_as_one(lifted: LiftedObject) -> Pose:
+    """The pose of an object that is turned, and moved in the world, as one body."""
+    points = lifted.world_points(lifted.control_points.astype(np.float64))
+    moved = lifted.object_points((points - [0, 0, 1]) @ TURN.T + [0.02, -0.01, 1.1])
+    return Pose(moved, np.broadcast_to(TURN, (len(moved), 3, 3)))
+
+
+def _thinner(document: Document) -> Document:
+    return edits.set_thickness(document, 0, 0.4)
+
+
+def _with_another_back(document: Document) -> Document:
+    return _lifted_anew(document, LiftSettings(2500, 1.5, back="mirrored"))
+
+
+shape_changes = pytest.mark.parametrize("change", [_thinner, _with_another_back])
+
+
+@shape_changes
+def test_what_was_moved_as_one_body_is_so_in_another_shape_in_its_key_poses_too(change):
+    """A pose that no handle gives, the one from which handles move it, and key poses."""
+    before = _document()
+    pose, region = _moved_as_one(_lifted(before)), _region(before)
+    posed = replace(before.objects[0], pose=pose, base=Base(pose, anchors=region))
+    document = add_key(before.with_object(0, replace(posed, handles=(), base=Base())))
+    document = document.with_object(0, replace(posed, keys=document.objects[0].keys))
+    document = _with_handles(add_key(document), True)
+    document = add_key(edits.set_placement(document, 0, Placement(move=(9.0, 0.0))))
+    item = change(document).objects[0]
+    wanted = _moved_as_one(item.lifted)
+    for found in (item.pose, item.base.pose, *(key.pose for key in item.keys)):
+        assert found is not None
+        np.testing.assert_allclose(found.points, wanted.points, atol=1e-6)
+        np.testing.assert_allclose(found.rotations, wanted.rotations, atol=1e-6)
+    x = _seen(item.lifted, item.lifted.control_points)[:, 0]
+    assert (x[item.base.anchors] < 68).all() and len(item.base.anchors) > (x < 55).sum()
+    assert [key.placement.move[0] for key in item.keys] == [0.0, 0.0, 9.0]
+    handles = [h.control_point for h in item.handles]
+    assert [[h.control_point for h in key.handles] for key in item.keys] == [[], [], handles]
+
+
+@thicknesses
+def test_a_key_pose_is_the_same_after_there_and_back(thickness):
+    before = _with_handles(_document(), True)
+    solver = shapes.scene("ellipse", 1500).puppet.deformer
+    pose = solver.solve(before.objects[0].handles).pose
+    before = add_key(edits.set_pose(before, 0, pose))
+    back = edits.set_thickness(edits.set_thickness(before, 0, thickness), 0, 1.0)
+    (key,) = back.objects[0].keys
+    assert np.abs(key.pose.points - pose.points).max() < 1e-5
+    assert np.abs(key.pose.rotations - pose.rotations).max() < 1e-9
 
 
 def test_an_object_that_is_not_lifted_has_no_thickness_to_change():

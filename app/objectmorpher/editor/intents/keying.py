@@ -62,14 +62,18 @@ class Keying:
             self._editor.apply(t("Add key pose"), key_edits.add_key(document))
 
     def show(self, number: int) -> None:
-        """Put the objects into a key pose."""
+        """Put the objects into a key pose, but for those that are locked."""
         document = self._editor.committed
         if document is None or number >= self.count or self.shown == number:
             return
         self._posing.select(None)
         self._last = number
-        label = t("Go to key pose {number}", number=number + 1)
-        self._editor.apply(label, key_edits.at_key(document, number))
+        changed = key_edits.free_at_key(document, number)
+        if changed is not document:
+            label = t("Go to key pose {number}", number=number + 1)
+            self._editor.apply(label, changed)
+        if (stays := key_edits.off_key(changed, number)) is not None:
+            self._editor.say_locked(stays)
 
     def step(self, by: int) -> None:
         """Go to the next key pose, or the one before; after the last comes the first."""

@@ -99,7 +99,7 @@ class Shaping:
     # Words
 
     def preview_thickness(self, thickness: float) -> None:
-        """Shows the object thicker or thinner; `Editor.commit` makes it a step."""
+        """Shows the object thicker or thinner; `end_thickness` makes it a step."""
         editor, document = self._editor, self._editor.committed
         if document is None or not editor.is_lifted or editor.hand.is_busy or self.why_fixed:
             return
@@ -109,9 +109,16 @@ class Shaping:
             return
         try:
             changed = edits.set_thickness(document, k, thickness)
-            editor.preview = editor.derived.solved(changed, k, None)
+            editor.preview = editor.derived.posed_again(changed, k)
         except ValueError as error:
             editor.complain(str(error))
+
+    def end_thickness(self) -> None:
+        """Make the object as thick as it is shown, in its key poses, too."""
+        editor = self._editor
+        if editor.preview is not None:
+            editor.preview = editor.derived.keys_again(editor.preview, editor.current)
+        editor.commit(t("Thickness"))
 
     @property
     def trust(self) -> float:

@@ -26,7 +26,6 @@ from ..widgets.widgets import (
     note,
     number_field,
     small_text,
-    take,
     text_top,
     tooltip,
 )
@@ -146,8 +145,10 @@ def _draw_thickness(editor: Editor) -> None:
     low, high = 100 * LEAST_THICKNESS, 100 * MOST_THICKNESS
     number = Number(t("Thickness"), "%.0f %%", 1.0, 10.0, 100.0, low, high)
     change = number_field(number, 100 * shape.thickness)
-    preview = editor.shaping.preview_thickness
-    take(editor, change, lambda: preview(change.value / 100), t("Thickness"))
+    if change.is_changed:
+        editor.shaping.preview_thickness(change.value / 100)
+    if change.is_done:
+        editor.shaping.end_thickness()
 
 
 def _draw_trust(editor: Editor) -> None:
