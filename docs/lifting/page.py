@@ -176,6 +176,18 @@ whose edges are crisp (box, domino, card, mug, brick, cup, ring, vase), come out
 pitch by 20 degrees, 0.1 lower of a turn by 20 and the same of one by 35; the domino loses 1.0 dB to
 one side.
 
+Later the side's picture took the photo's place there already from a ratio of 0.8 instead of 0.6:
+hair that the background shines through had shown it in streaks. Of eleven animals and people,
+turned by 12 and 25 degrees each way, 3.7 % of the pixels that change were nearer to the colours of
+the background than to the object's, and are 1.8 % (fewer in 40 of the 44 views). It was seen on an
+alpaca, of which it was 3.4 % and is 0.1 %.
+
+Where one part stands before another, as a cup on its saucer, the photo goes on up to the line where
+they meet; before, both had plain colours there as soon as they were moved, also where a handle or a
+spoon reaches over it. The cup of the samples, moved by 8 and 5 px, differs there from the photo by
+2.0 levels of 255 instead of 4.5 (elsewhere by 1.3), moved by 30 and 20 px by 2.8 instead of 5.1. A
+drawn cup on a saucer, turned by 20 and 35 degrees, keeps its figures to 0.1 dB.
+
 What stands out, an eye or a nose, is not there twice; but of a striped or spotted coat nearly
 everything stood out, two thirds of a tabby, and its side stayed plain. Now at most the 7 % of a
 surface that are most unlike their surroundings stand out, with what lies close around them; the
