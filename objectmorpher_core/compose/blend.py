@@ -278,8 +278,6 @@ class Blend:
 
     def shares(self) -> Sums:
         """The shares of photo, lifter, inpainter and paint in the changed pixels; else all 0."""
-        photo, lifter, inpainter, paint = (
-            math.fsum(sums) for sums in zip(*self._sums, strict=True)
-        )
+        photo, lifter, inpainter, paint = (math.fsum(s[k] for s in self._sums) for k in range(4))
         whole = photo + lifter + inpainter + paint or 1.0
         return photo / whole, lifter / whole, inpainter / whole, paint / whole

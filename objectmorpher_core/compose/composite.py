@@ -47,12 +47,13 @@ from .light.lighting import NOTHING, Lighting, Lit, texture_source
 from .light.lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
 from .paint import PaintedShare
-from .plate.plate import hole_margin, plate_crop, plate_of_holes
+from .plate.plate import hole_margin, overlap, plate_crop, plate_of_holes
 from .shadow.shadow import Shade
 
 STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
 OPAQUE = 1 - STILL_ALPHA
 ELSEWHERE = 1e6  # px by which an object of another photo has moved, wherever it is
+NOWHERE: Box = (0, 0, 0, 0)
 PIECE = 2 * TILE  # rows that a thread works on: what it computes stays in the processor's cache
 
 
@@ -206,7 +207,11 @@ class _Drawing:
     def _region(self, camera: Camera) -> Box:
         """Everything the edit can touch."""
         margin = int(np.ceil(self._margin)) + 2
-        boxes = [t.matte.box for t in self._things if t.item.is_moved or t.look.is_shaded]
+        boxes = [
+            thing.item.matte_here.box
+            for thing in self._things
+            if thing.item.matte_here is not None and (thing.item.is_moved or thing.look.is_shaded)
+        ]
         for k, shown in self._drawables.items():
             if (box := shown.box()) is not None:
                 rim = reach_of(self._things[k].look.blur)
@@ -214,9 +219,11 @@ class _Drawing:
         boxes += [whole_box(shade.bounds) for shade in self._shades]
         if self._plate is not None and self._plate.painted is not None:
             boxes.append(self._plate.box)
+        if not boxes:  # what came in from another photo is hidden, or nowhere in this one
+            return NOWHERE
         x0, y0 = (int(low) - margin for low in np.min(boxes, axis=0)[:2])
         x1, y1 = (int(high) + margin for high in np.max(boxes, axis=0)[2:])
-        return max(x0, 0), max(y0, 0), min(x1, camera.width), min(y1, camera.height)
+        return overlap((x0, y0, x1, y1), (0, 0, camera.width, camera.height)) or NOWHERE
 
     def strips(self) -> Iterator[tuple[int, int]]:
         """First and last row of the strips that are drawn at a time.
@@ -225,7 +232,7 @@ class _Drawing:
         part of the view the rasteriser is asked for.
         """
         x0, y0, x1, y1 = self.box
-        rows = max(STRIP // (x1 - x0) // PIECE, 1) * PIECE
+        rows = max(STRIP // max(x1 - x0, 1) // PIECE, 1) * PIECE
         for top in range(y0, y1, rows):
             yield top, min(top + rows, y1)
 

@@ -248,7 +248,12 @@ class Lighting:
     def _defocus(
         self, item: EditObject, splats: PosedSplats, rest: PosedSplats, horizon: float | None
     ) -> float:
-        """Px by which the object is too sharp for where it is now."""
+        """Px by which the object is too sharp for where it is now; 0 of one of another photo.
+
+        Where that one stood, and how blurred it was there, only its own photo shows.
+        """
+        if item.is_visitor:
+            return 0.0
         assert item.lifted is not None and item.matte is not None
         camera, shadow = self._document.photo.camera, item.grounded_shadow
         normal = _normal_under(item.lifted, camera, horizon, shadow)

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base.arrays import F32, F64, Pixels, frozen
+from ...base.arrays import F32, F64, Mask, Pixels, frozen
 
 BLOCK = 16  # px
 MOST_BLOCKS = 4000  # that are looked at, however large the photo
@@ -26,6 +26,9 @@ FINE = 0.3  # cycles per px, from which on little is texture
 BINS = 12  # of brightness
 FEWEST = 8  # blocks in a bin that says something
 STEEPEST = 2.5  # x the least deviation of a bin: a larger one is texture, not noise
+ROUNDED = 1e-9  # variance below which a block is of one colour, and the rest is its arithmetic's
+ALIKE = 0.25  # of a block's pixels, that are like their neighbours, if some program has filled it
+DRAWN = 0.8  # of the blocks: where so many are filled, the picture is no photo
 SATURATED = 1.5 / 255  # from black and from white, where nothing can be noisier
 MOST = 12 / 255  # deviation: where everything is texture, not all of that is grain
 LEAST = 0.4 / 255  # deviation below which there is no grain: about a byte's own rounding
@@ -59,6 +62,10 @@ def find_noise(pixels: Pixels) -> Noise | None:
     if min(pixels.shape[:2]) < BLOCK or len(blocks := _blocks(pixels)) < FEWEST:
         return None
     rest, means = _residuals(blocks)
+    is_grainy = _may_be_grainy(blocks, rest)
+    if is_grainy.mean() < 1 - DRAWN:
+        return None
+    rest, means = rest[is_grainy], means[is_grainy]
     flat = _flat(rest.var((1, 2)), means.mean(1))
     if len(flat) == 0:
         return None
@@ -103,6 +110,20 @@ def _residuals(blocks: F32) -> tuple[F32, F32]:
     plane = np.linalg.qr(np.column_stack([np.ones(x.size), x.ravel(), y.ravel()]))[0]
     own = np.asarray(plane, np.float32)
     return np.asarray(blocks - own @ (own.T @ blocks), np.float32), blocks.mean(1)
+
+
+def _may_be_grainy(blocks: F32, rest: F32) -> Mask:
+    """(n,) which blocks (n, p, 3) no program has filled; `rest` is what their planes leave.
+
+    A bar at the side of a photo says nothing about the photo. Where there is any, what is drawn
+    beside it in flat colours, edges and all, is no grain, either.
+    """
+    is_filled = rest.var((1, 2)) < ROUNDED
+    if is_filled.any():
+        square = blocks.reshape(-1, BLOCK, BLOCK, 3)
+        is_alike = (square[:, :, 1:] == square[:, :, :-1]).all(-1)
+        is_filled |= is_alike.mean((1, 2)) > ALIKE
+    return ~is_filled
 
 
 def _flat(variance: F32, mean: F32) -> np.ndarray:

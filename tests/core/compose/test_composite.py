@@ -16,10 +16,11 @@ import pytest
 from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_core.compose import composite as composite_module
 from objectmorpher_core.compose.composite import Composite, composite, straight_cutout
+from objectmorpher_core.compose.layers import layers
 from objectmorpher_core.compose.light.lighting import texture_source
 from objectmorpher_core.compose.plate.plate import hole_margin
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, Placement, Pose
+from objectmorpher_core.document.model import Document, Origin, Placement, Pose
 from objectmorpher_core.raster import texture as texture_module
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.texture import TextureRows, TextureSource
@@ -220,6 +221,44 @@ def test_an_object_behind_the_frame_or_nowhere_changes_only_its_hole():
     result = composite(_placed(scene.document(), MOVES["out of the photo"]), {0: scene.puppet})
     assert result.shares.from_inpainter > 0.5
     assert (result.pixels[scene.mask] == 128).mean() > 0.99
+
+
+# ---- an object of another photo -------------------------------------------------------------
+
+
+def _with_guest(placement: Placement | None = None, **more) -> Document:
+    """A photo of 40 x 30 px without objects, and in it one of a photo of 160 x 120 px."""
+    item = shapes.scene("frame").document().objects[0]
+    small = shapes.scene("ellipse").document()
+    picture = replace(small.photo.picture, pixels=small.photo.pixels[:30, :40])
+    photo = replace(small.photo, picture=picture, camera=shapes.camera(40, 30))
+    assert item.lifted is not None
+    lifted = replace(item.lifted, origin=Origin("other", shapes.camera()))
+    nowhere = np.zeros((30, 40), bool)
+    guest = replace(item, lifted=lifted, mask=nowhere, placement=placement or Placement(), **more)
+    return replace(small, photo=photo, objects=(guest,), plate=None)
+
+
+@pytest.mark.parametrize(
+    "document",
+    [_with_guest(is_visible=False), _with_guest(Placement(move=(5000.0, 0.0)))],
+    ids=["hidden", "out of the photo"],
+)
+def test_a_guest_that_is_not_seen_leaves_the_photo(document):
+    result, pile = layers(document)
+    assert np.array_equal(result.pixels, document.photo.pixels)
+    assert result.changed == 0 and not result.footprint.any()
+    assert sum(vars(result.shares).values()) == 0
+    assert [layer.name for layer in pile] == ["Photo"]
+    assert not straight_cutout(result, np.dtype(np.uint8), (40, 30)).any()
+
+
+def test_a_guest_is_neither_blurred_nor_not_by_what_stands_where_it_was_elsewhere():
+    document = _with_guest(Placement(move=(-20.0, -10.0), depth=1.0))
+    plain = composite(document)
+    assert plain.changed > 0
+    asked = composite(edits.set_share(document, 0, "defocus", 1.0))
+    assert np.array_equal(asked.pixels, plain.pixels)
 
 
 # ---- strip by strip -------------------------------------------------------------------------

@@ -188,6 +188,42 @@ def test_a_photo_without_noise_has_none():
     assert find_noise(smooth) is None
 
 
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.45])
+@pytest.mark.parametrize("grey", [32, 90, 128, 205])
+def test_a_bar_of_one_colour_changes_nothing_about_the_grain_beside_it(share, grey):
+    pixels, _ = _grainy(0.0)
+    whole = find_noise(pixels)
+    bar = np.full((HEIGHT, round(share / (1 - share) * WIDTH), 3), grey, np.uint8)
+    noise = find_noise(np.hstack([pixels, bar]))
+    assert whole is not None and noise is not None
+    levels = np.s_[round(255 * 0.32) : round(255 * 0.6)]  # of the photo
+    ratio = noise.deviation[levels] / whole.deviation[levels]
+    assert np.abs(ratio - 1).max() < 0.15
+    assert np.isfinite(noise.tile).all()
+
+
+def test_what_is_drawn_in_flat_colours_has_no_grain():
+    rng = np.random.default_rng(5)
+    drawing = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
+    for x, y, radius, *colour in rng.integers(5, 250, (60, 6)).tolist():
+        place = (x * WIDTH // 255, y * HEIGHT // 255)
+        cv2.circle(drawing, place, 5 + radius // 12, colour, cv2.FILLED, cv2.LINE_AA)
+    assert find_noise(drawing) is None
+
+
+def test_an_object_moved_beside_a_grey_bar_keeps_its_colours():
+    pixels, inside = _grainy(0.0)
+    bar = np.full((HEIGHT, WIDTH // 2, 3), 128, np.uint8)
+    wide, mask = np.hstack([pixels, bar]), np.hstack([inside, np.zeros(bar.shape[:2], bool)])
+    scene = shapes.lifted_scene(wide, mask, 2000)
+    moved = edits.set_placement(scene.document(), 0, PLACES["by a part of a pixel"])
+    plain, grained = (
+        composite(edits.set_share(moved, 0, "grain", share), {0: scene.puppet}).pixels[SEEN]
+        for share in (0.0, 1.0)
+    )
+    assert np.abs(grained.mean((0, 1)) - plain.mean((0, 1))).max() < 2
+
+
 def test_half_as_much_grain_is_half_as_strong_and_deep_photos_have_it_too():
     pixels, _ = _grainy(0.0)
     noise = find_noise(pixels)
