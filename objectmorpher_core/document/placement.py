@@ -6,18 +6,29 @@ turn and scale stay, every point of the object keeps its offset from the centre.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ..base.arrays import F64
 from ..base.camera import Camera
-from ..base.rotations import CAMERA_GIMBAL, Gimbal, turn_matrix, turn_of
+from ..base.rotations import (
+    CAMERA_GIMBAL,
+    Gimbal,
+    matrix_from_vector,
+    turn_matrix,
+    turn_of,
+    vector_from_matrix,
+)
 from .model import Document, EditObject, LiftedObject, Placement
 
 NEAREST = 0.02  # x its depth: an object that is held comes no nearer
 SKEW = 1e-3  # of a rotation that was rounded on its way
+
+Angles = tuple[float, float, float]
 
 
 def centre_of(placement: Placement, lifted: LiftedObject, camera: Camera) -> F64:
@@ -128,6 +139,7 @@ FOOT = 0.04  # x the object's height, from its lowest point: what touches the gr
 # deg by which a thing may lean out over what touches the ground: of the things that stand in 16
 # photos 14 do by 6 at most, the two that were found to lie on one side of them by 34 and more
 LEAN = 15.0
+SHALLOW = 0.75  # x the diagonal of what it covers: a bowl is less high; a desk lamp may lean out
 
 
 def turned(
@@ -224,6 +236,91 @@ def grown(placement: Placement, scale: float, item: EditObject, document: Docume
     return standing
 
 
+DETOUR = 1.5  # x the shortest turn: a way of the angles that is longer is none
+ANGLES = 16  # of a way, to measure it
+
+
+def blended(
+    start: Placement, end: Placement, share: float, item: EditObject, document: Document
+) -> Placement:
+    """The placement when a `share` of the way from one to another is done.
+
+    It turns the shorter way round. The foot of what stands goes straight, and stays if it is in
+    the same place in both; all else goes by its centre.
+    """
+    assert item.lifted is not None, "only a lifted object is placed"
+    gimbal = gimbal_of(item, document)
+    x, y, depth = _mean((*start.move, start.depth), (*end.move, end.depth), share)
+    turn = _turn_between(start.turn, end.turn, share, gimbal)
+    scale = start.scale ** (1 - share) * end.scale**share
+    placement = Placement((x, y), depth, turn, scale)
+    lifted, camera = item.lifted, document.photo.camera
+    if not _goes_by_its_foot(start, end, lifted, camera, gimbal.down):
+        return placement
+    foot = _foot(lifted, gimbal.down)
+    ends = [m[:3, :3] @ foot + m[:3, 3] for m in (p.matrix(lifted, camera) for p in (start, end))]
+    if min(point[2] for point in ends) <= 0:
+        return placement
+    there = np.array([[*camera.project(point), point[2]] for point in ends])
+    *xy, away = there[0] + share * (there[1] - there[0])
+    offset = scale * turn_matrix(*turn) @ (foot - lifted.centre)
+    centre = camera.unproject(np.array(xy), float(away)) - offset
+    return with_centre(placement, centre, lifted, camera) if centre[2] > 0 else placement
+
+
+def _mean(start: Sequence[float], end: Sequence[float], share: float) -> list[float]:
+    return [a + share * (b - a) for a, b in zip(start, end, strict=True)]
+
+
+def _turn_between(start: Angles, end: Angles, share: float, gimbal: Gimbal) -> Angles:
+    """A `share` of the way from one turn to another, degrees.
+
+    By the gimbal's own angles, so that what stands keeps upright; by the shortest turn where those
+    would take the object head over heels, which they do where they are cut to 180 degrees.
+    """
+    before = gimbal.of(start)
+    after = [_near(b, a) for a, b in zip(before, gimbal.of(end), strict=True)]
+    first = turn_matrix(*start)
+    shortest = vector_from_matrix(turn_matrix(*end) @ first.T)
+    most = DETOUR * float(np.degrees(np.linalg.norm(shortest))) + STILL
+    yaw, pitch, roll = _mean(before, after, share)
+    if np.abs(np.subtract(before, after)).sum() <= most:  # it is no longer than its three parts
+        return gimbal.turn((yaw, pitch, roll))
+    way = [gimbal.matrix(*_mean(before, after, k / ANGLES)) for k in range(ANGLES + 1)]
+    steps = [np.linalg.norm(vector_from_matrix(b @ a.T)) for a, b in pairwise(way)]
+    if np.degrees(np.sum(steps)) <= most:
+        return gimbal.turn((yaw, pitch, roll))
+    return turn_of(matrix_from_vector(share * shortest) @ first)
+
+
+def _near(angle: float, other: float) -> float:
+    """The same direction within 180 degrees of the `other` angle."""
+    away = angle - other
+    if abs(away) <= 180 + STILL:
+        return angle
+    return angle - 360 * round(away / 360)
+
+
+def _goes_by_its_foot(
+    start: Placement, end: Placement, lifted: LiftedObject, camera: Camera, down: np.ndarray
+) -> bool:
+    """Whether it was turned or scaled where it stands: about its upright, or with its foot still.
+
+    What was turned about its centre alone is not.
+    """
+    if not lifted.stands or (start.turn, start.scale) == (end.turn, end.scale):
+        return False
+    if (start.move, start.depth) == (end.move, end.depth):
+        return False
+    motions = [place.matrix(lifted, camera) for place in (start, end)]
+    turned = [turn_matrix(*place.turn) @ down for place in (start, end)]
+    if np.linalg.norm(turned[1] - turned[0]) < STILL:
+        return True
+    foot = _foot(lifted, down)
+    feet = [motion[:3, :3] @ foot + motion[:3, 3] for motion in motions]
+    return bool(np.linalg.norm(feet[1] - feet[0]) < STILL * lifted.diameter * lifted.scale)
+
+
 def is_in_place(item: EditObject, document: Document) -> bool:
     """Whether it is as large as in the photo, and its foot or centre is where it is there.
 
@@ -285,8 +382,10 @@ def _leans_out(points: np.ndarray, lowest: np.ndarray, foot: F64, down: np.ndarr
     gap = float(np.linalg.norm(aside))
     if gap == 0:
         return False
-    beyond = gap - float(((lowest - foot) @ (aside / gap)).max())
-    return beyond > np.tan(np.radians(LEAN)) * height
+    way, depth = aside / gap, points @ down
+    is_shallow = np.ptp(depth) < SHALLOW * np.linalg.norm(np.ptp(points - depth[:, None] * down, 0))
+    beyond = gap - float(((lowest - foot) @ way).max())
+    return bool(is_shallow and beyond > np.tan(np.radians(LEAN)) * height)
 
 
 @dataclass(frozen=True, eq=False)

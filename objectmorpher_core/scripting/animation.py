@@ -17,16 +17,29 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, U8, Mask, Pixels, crop, pixels_from_unit, unit_pixels
+from ..base.arrays import (
+    F32,
+    F64,
+    U8,
+    Mask,
+    Pixels,
+    crop,
+    pixels_from_unit,
+    same_values,
+    unit_pixels,
+)
 from ..base.camera import Camera
 from ..base.progress import Progress, silent
-from ..base.rotations import Gimbal, matrix_from_vector, vector_from_matrix
+from ..base.rotations import vector_from_matrix
 from ..compose.composite import composite
 from ..deform.puppet import Puppet, puppet_of
+from ..deform.way import PoseWay
 from ..document.key_edits import at_key, count_keys
 from ..document.model import Document, EditObject, Handle, Matte, Photo, Placement, Plate, Pose
 from ..document.paint import Paint
-from ..document.placement import gimbal_of
+from ..document.placement import blended, gimbal_of
+from ..document.placement import turned as turned_about
+from ..document.pose import Base
 from ..document.settings import AS_IN_THE_PHOTO, Refined
 from ..pictures.image import to_u8
 from ..pictures.video import MOST_FRAMES
@@ -309,6 +322,8 @@ class _Film:
             if item.lifted is not None
         }
         self._last: dict[int, Pose] = {}  # of each object, to go on from
+        self._ways: dict[int, tuple[Pose | None, Pose | None, PoseWay]] = {}  # the last of each
+        self._bodies: dict[int, F64] = {}  # see `_standing`
 
     def drawn(self, document: Document) -> U8:
         """The composite of the document at some moment."""
@@ -342,11 +357,15 @@ class _Film:
         return replace(document, refined=seen if share > 0 else None)
 
     def _morphed(self, share: float) -> Document:
-        """The document when its objects have gone a `share` of their way, not refined."""
+        """The document when its objects have gone a `share` of their way, not refined.
+
+        One of another photo is where it is: its way here began in no place of this one.
+        """
         objects = tuple(
-            self._between(k, _at_rest(item), item, share) if item.is_moved else item
+            self._between(k, _at_rest(item), item, share)
+            if item.is_moved and not item.is_visitor else item
             for k, item in enumerate(self._document.objects)
-        )
+        )  # fmt: skip
         return replace(self._document, objects=objects, refined=None)
 
     def keyed(self, time: float) -> Document:
@@ -364,37 +383,59 @@ class _Film:
         return replace(self._document, objects=objects, refined=None)
 
     def turned(self, k: int, yaw: float) -> Document:
-        """The document with object `k` turned about its own upright axis, degrees."""
-        item = self._document.objects[k]
-        gimbal = self._gimbal(item)
+        """The document with object `k` turned where it stands, about its own upright, degrees."""
+        item, lifted = self._document.objects[k], self.puppets[k].lifted
+        gimbal = gimbal_of(item, self._document)
         old = gimbal.of(item.placement.turn)
         turn = gimbal.turn((old[0] + yaw, old[1], old[2]))
-        placement = replace(item.placement, turn=turn)
+        camera, placement = self._document.photo.camera, replace(item.placement, turn=turn)
+        try:
+            standing = self._standing(k), lifted, camera, gimbal.down
+            on_its_foot = turned_about(item.placement, turn, *standing)
+            on_its_foot.matrix(lifted, camera)
+            placement = on_its_foot
+        except ValueError:  # behind the camera: then about its middle
+            pass
         turned = replace(item, placement=placement, is_visible=True)
         return replace(self._document.with_object(k, turned), refined=None)
 
-    def _gimbal(self, item: EditObject) -> Gimbal:
-        return gimbal_of(item, self._document)
+    def _standing(self, k: int) -> F64:
+        """(N, 3) world, before its placement: the solid Gaussians of object `k`, as it is bent."""
+        if k not in self._bodies:
+            item, lifted = self._document.objects[k], self.puppets[k].lifted
+            points = lifted.body.means.astype(np.float64)
+            if item.pose is not None:
+                points = self.puppets[k].deformer.skin_points(points, item.pose).points
+            self._bodies[k] = lifted.world_points(points)
+        return self._bodies[k]
 
     def _between(self, k: int, start: EditObject, end: EditObject, share: float) -> EditObject:
         """Object `k` when a `share` of the way from one of its states to another is done."""
-        placement = _blended(start.placement, end.placement, share, self._gimbal(end))
+        placement = blended(start.placement, end.placement, share, end, self._document)
         if share <= 0 or (start.pose is None and end.pose is None):
             return replace(end, pose=start.pose, placement=placement)
         if share >= 1:
             return end
-        pose = self._solved(k, start, end, share)
-        pose = pose or _mixed(self.puppets[k], start.pose, end.pose, share)
+        pose = self._solved(k, start, end, share) or self._mixed(k, start.pose, end.pose, share)
         return replace(end, pose=pose, placement=placement)
+
+    def _mixed(self, k: int, start: Pose | None, end: Pose | None, share: float) -> Pose:
+        """Between two poses that no handles hold, or not the same ones; None is rest."""
+        known = self._ways.get(k)
+        if known is None or known[0] is not start or known[1] is not end:
+            deformer = self.puppets[k].deformer
+            rest = deformer.rest()
+            known = start, end, PoseWay(deformer, start or rest, end or rest)
+            self._ways[k] = known
+        return known[2].at(share)
 
     def _solved(self, k: int, start: EditObject, end: EditObject, share: float) -> Pose | None:
         """The pose that the handles give; None where it is not they alone that make both."""
         shifts = _summed(start.rig.shifts, end.rig.shifts, share)
-        has_base = start.base.pose is not None or end.base.pose is not None
         if (
-            has_base
+            not _begin_alike(start.base, end.base)
             or not _alike(start.handles, end.handles)
-            or (not end.handles and shifts is None)
+            or (not end.handles and (shifts is None or end.base.pose is not None))
         ):
             return None
         deformer = self.puppets[k].deformer
@@ -402,7 +443,7 @@ class _Film:
             deformer = deformer.with_rig(replace(end.rig, shifts=shifts))
         handles = tuple(
             replace(b, target=a.target + share * (b.target - a.target),
-                    turn=_summed(a.turn, b.turn, share))
+                    turn=_summed(*_turns(a, b, start.pose, end.pose), share))
             for a, b in zip(start.handles, end.handles, strict=True)
         )  # fmt: skip
         solved = deformer.solve(handles, end.footing, self._last.get(k), tolerance=TOLERANCE)
@@ -425,8 +466,10 @@ def _faded(before: U8, after: U8, share: float) -> U8:
 def _at_rest(item: EditObject) -> EditObject:
     """The object as it is in the photo, its handles where they take hold."""
     handles = tuple(replace(handle, target=handle.point, turn=None) for handle in item.handles)
-    rig = replace(item.rig, shifts=None)
-    return replace(item, handles=handles, rig=rig, pose=None, placement=Placement())
+    rig, base = replace(item.rig, shifts=None), item.base.at_rest
+    return replace(
+        item, handles=handles, rig=rig, base=base, pose=None, placement=Placement()
+    )  # fmt: skip
 
 
 def _as_in_the_photo(item: EditObject) -> EditObject:
@@ -466,30 +509,27 @@ def _alike(start: Sequence[Handle], end: Sequence[Handle]) -> bool:
     )
 
 
+def _begin_alike(start: Base, end: Base) -> bool:
+    """Whether the handles move the object from the same pose in both."""
+    if start.pose is None or end.pose is None:
+        return start.pose is end.pose
+    return same_values(start, end)
+
+
+def _turns(
+    start: Handle, end: Handle, before: Pose | None, after: Pose | None
+) -> tuple[F64 | None, F64 | None]:
+    """The turns of a handle in two poses; where one is free, it is as the pose has it there."""
+    one, other = start.turn, end.turn
+    if one is None and other is not None and before is not None:
+        one = vector_from_matrix(before.rotations[start.control_point], other)
+    elif other is None and one is not None and after is not None:
+        other = vector_from_matrix(after.rotations[end.control_point], one)
+    return one, other
+
+
 def _summed(start: Any, end: Any, share: float) -> Any:
     """(1 - share) start + share end, where None is zero; None where both are."""
     if start is None:
         return None if end is None else share * end
     return (1 - share) * start if end is None else start + share * (end - start)
-
-
-def _blended(start: Placement, end: Placement, share: float, gimbal: Gimbal) -> Placement:
-    def mean(a: float, b: float) -> float:
-        return a + share * (b - a)
-
-    (x0, y0), (x1, y1) = start.move, end.move
-    yaw, pitch, roll = map(mean, gimbal.of(start.turn), gimbal.of(end.turn))
-    scale = start.scale ** (1 - share) * end.scale**share
-    return Placement((mean(x0, x1), mean(y0, y1)), mean(start.depth, end.depth),
-                     gimbal.turn((yaw, pitch, roll)), scale)  # fmt: skip
-
-
-def _mixed(puppet: Puppet, start: Pose | None, end: Pose | None, share: float) -> Pose:
-    """Between two poses that no handles hold, or not the same ones; None is rest."""
-    rest = puppet.deformer.rest()
-    start, end = start or rest, end or rest
-    turns = [
-        a @ matrix_from_vector(share * vector_from_matrix(a.T @ b))
-        for a, b in zip(start.rotations, end.rotations, strict=True)
-    ]
-    return Pose(start.points + share * (end.points - start.points), np.array(turns))

@@ -25,7 +25,7 @@ from objectmorpher_core.document.key_edits import (
 )
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import spun
-from objectmorpher_core.document.pose import Pose
+from objectmorpher_core.document.pose import UNHELD, Pose
 from objectmorpher_core.document.settings import AS_IN_THE_PHOTO, Refined, Shadow
 from objectmorpher_core.document.visitor_edits import departing, with_visitor
 from objectmorpher_core.pictures.video import (
@@ -126,6 +126,77 @@ def test_between_photo_and_edit_a_thing_that_is_spun_stands():
     found = next(islice(frames(whole, Clip("morph", seconds=1.0, rate=8)), 2, None))
     assert difference(found, composite(half, {0: scene.puppet}).pixels) < 0.5
     assert difference(found, document.photo.pixels) > 2.0
+
+
+@pytest.mark.parametrize("up", [None, (0.0, -0.6, -0.8)])
+def test_what_stands_turns_and_sways_where_it_stands(up):
+    """As a spin by as many degrees does; it was a turn about its middle, and slid."""
+    document = shapes.scene("ellipse").document()
+    lifted = replace(shapes.scene("ellipse").lifted, up=up, stands=True)
+    document = document.with_object(0, replace(document.objects[0], lifted=lifted))
+    found = list(frames(document, Clip("turn", seconds=1.0, rate=6)))
+    for k, frame in enumerate(found):
+        place = spun(Placement(), 60.0 * k, document.objects[0], document)
+        expected = composite(edits.set_placement(document, 0, place)).pixels
+        assert difference(frame, expected) < 0.02, k
+
+
+@pytest.mark.parametrize("up", [None, (0.0, -0.6, -0.8)])
+def test_a_film_turns_the_shorter_way_round(up):
+    """From 170 degrees to 190, which are stored as -170, by 180; and back by it."""
+    document = shapes.scene("ellipse").document()
+    lifted = replace(shapes.scene("ellipse").lifted, up=up)
+    document = document.with_object(0, replace(document.objects[0], lifted=lifted))
+
+    def turned(degrees: float) -> Document:
+        place = spun(Placement(), degrees, document.objects[0], document)
+        return edits.set_placement(document, 0, place)
+
+    keyed_twice = document
+    for degrees in (170.0, 190.0):
+        keyed_twice = add_key(turned(degrees).with_object(0, replace(
+            turned(degrees).objects[0], keys=keyed_twice.objects[0].keys
+        )))  # fmt: skip
+    found = list(frames(keyed_twice, Clip("keys", seconds=1.0, rate=8)))
+    behind = composite(turned(180.0)).pixels
+    for k in (2, 6):
+        assert difference(found[k], behind) < 0.02
+
+
+def half_turned(has_base: bool) -> Document:
+    """Two key poses: as it is, and turned by 170 degrees in the picture, by one handle.
+
+    Both from one pose, or only the second from one, as where another handle was there between.
+    """
+    scene = shapes.scene("disc")
+    deformer, document = scene.puppet.deformer, scene.document()
+    middle = deformer.nearest_control_point(scene.lifted.control_points.mean(0))
+    first = shapes.handle(scene.lifted, middle, np.array([0.01, 0.0, 0.0]), turn=np.zeros(3))
+    begun = deformer.solve((first,), UNHELD).pose
+    handles, base = deformer.held((first,), begun, UNHELD.anchors)
+    item = document.objects[0]
+    if has_base:
+        item = replace(item, handles=handles, pose=begun, base=base)
+    document = add_key(document.with_object(0, item))
+    later = tuple(replace(h, turn=np.radians([0.0, 0.0, 170.0])) for h in handles)
+    item = document.objects[0]
+    pose = deformer.solve(later, base).pose
+    item = replace(item, handles=later, pose=pose, base=base)
+    return add_key(document.with_object(0, item))
+
+
+@pytest.mark.parametrize("has_base", [True, False])
+@pytest.mark.parametrize("motion", ["keys", "morph"])
+def test_what_a_handle_turns_from_a_pose_does_not_shrink_on_its_way(motion, has_base):
+    """Along straight lines it was a tenth as large half-way."""
+    document = half_turned(has_base)
+    empty = composite(edits.set_visible(document, 0, False)).pixels.astype(int)
+    found = list(frames(document, Clip(motion, seconds=1.0, rate=20)))
+    areas = [int((np.abs(frame - empty).max(2) > 16).sum()) for frame in found]
+    assert min(areas) > 0.9 * max(areas)
+    first = composite(at_key(document, 0)).pixels if motion == "keys" else document.photo.pixels
+    assert np.array_equal(found[0], first)
+    assert np.array_equal(found[10], composite(document).pixels)
 
 
 def test_nothing_to_be_seen_is_said_in_a_sentence():
@@ -354,6 +425,21 @@ def test_a_morph_begins_as_the_photo_whatever_the_edit_changes(change):
     assert np.array_equal(found[10], edit)
     gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
     assert max(gaps) < 0.6 * difference(photo, edit)
+
+
+def test_what_comes_from_another_photo_is_faded_in_where_it_is():
+    """It neither slides nor grows: its way here began in no place of this photo."""
+    document = shapes.scene("ellipse").document()
+    place = Placement((40.0, 10.0), 0.3, (20.0, 0.0, 0.0), 0.8)
+    item = replace(departing(document, 0, None), placement=place)
+    item = replace(item, mask=np.zeros_like(item.mask))
+    document = with_visitor(replace(document, objects=(), plate=None), item)
+    found = list(frames(document, Clip(seconds=1.0, rate=20)))
+    photo = document.photo.pixels
+    there = (composite(document).pixels != photo).any(2)
+    shown = [(frame != photo).any(2) for frame in found]
+    assert there.any() and shown[5].sum() > 0.5 * there.sum()
+    assert not any((seen & ~there).any() for seen in shown)
 
 
 def test_shadows_and_repairs_fade_in_with_a_morph():

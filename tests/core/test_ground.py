@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import (
     CAMERA_GIMBAL,
@@ -16,14 +18,16 @@ from objectmorpher_core.base.rotations import (
     turn_of,
     vector_from_matrix,
 )
-from objectmorpher_core.document.model import LiftedObject, Placement
+from objectmorpher_core.document.model import Document, EditObject, LiftedObject, Placement
 from objectmorpher_core.document.placement import (
     GroundError,
     HeldPoint,
+    blended,
     centre_of,
     foot_of,
     gimbal_of,
     ground_under,
+    grown,
     is_in_place,
     placement_of,
     scaled,
@@ -333,3 +337,97 @@ def test_the_ground_lies_as_the_object_stands(scene):
     for delta, away in (((30, 8), 0.0), ((-60, 40), 0.7), ((10, -30), -0.2)):
         motion = hold.moved(np.array(delta, float), away).matrix(scene.lifted, scene.camera)
         assert abs(ground.below(motion[:3, :3] @ hold.point + motion[:3, 3])) < PLANE * hold.unit
+
+
+def _told(
+    scene: shapes.Scene, up: tuple[float, float, float] | None
+) -> tuple[Document, EditObject]:
+    document = scene.document()
+    lifted = replace(scene.lifted, up=up, stands=True)
+    thing = replace(document.objects[0], lifted=lifted)
+    return document.with_object(0, thing), thing
+
+
+def _way(start: Placement, end: Placement, thing: EditObject, document: Document) -> list[F64]:
+    """The rotations of the way from one placement to another, in 21 moments."""
+    shares = np.linspace(0, 1, 21)
+    found = [blended(start, end, float(share), thing, document) for share in shares]
+    return [turn_matrix(*place.turn) for place in found]
+
+
+def _angle(before: F64, after: F64) -> float:
+    """Degrees."""
+    return float(np.degrees(np.linalg.norm(vector_from_matrix(after @ before.T))))
+
+
+@over("up", [None, *UPS])
+def test_between_two_turns_a_thing_goes_no_long_way_round(scene, up):
+    """Whatever they are: each way is met at its ends, and has no jump."""
+    document, thing = _told(scene, up)
+    rng = np.random.default_rng(0)
+    pairs = [((170.0, 0.0, 0.0), (190.0, 0.0, 0.0)), ((170.0, 0.0, 0.0), (-170.0, 0.0, 0.0)),
+             ((90.0, 0.0, 0.0), (-90.0, 10.0, 0.0)), ((0.0, 85.0, 0.0), (170.0, 85.0, 170.0)),
+             *((tuple(a), tuple(b)) for a, b in rng.uniform(-180, 180, (16, 2, 3)))]  # fmt: skip
+    for start, end in pairs:
+        way = _way(Placement(turn=start), Placement(turn=end), thing, document)
+        np.testing.assert_allclose(way[0], turn_matrix(*start), atol=1e-9)
+        np.testing.assert_allclose(way[-1], turn_matrix(*end), atol=1e-9)
+        steps = [_angle(a, b) for a, b in pairwise(way)]
+        shortest = _angle(way[0], way[-1])
+        assert sum(steps) < 1.6 * shortest + 0.5, (start, end)
+        assert max(steps) < 8 * shortest / 20 + 0.1, (start, end)
+
+
+@over("up", [None, *UPS])
+@over("ends", [(170.0, 190.0), (190.0, 170.0), (90.0, 180.0), (180.0, 270.0), (0.5, 120.0)])
+def test_between_two_spins_a_thing_stands_and_its_foot_stays(scene, up, ends):
+    """Half-way it is spun by half the angle; and larger things grow there, as they do in one go."""
+    document, thing = _told(scene, up)
+    lifted, camera = thing.lifted, scene.camera
+    assert lifted is not None
+    start, end = (spun(Placement(depth=0.1), degrees, thing, document) for degrees in ends)
+    end = grown(end, 1.4, thing, document)
+    half = spun(Placement(depth=0.1), 0.5 * sum(ends), thing, document)
+    expected = grown(half, 1.4**0.5, thing, document).matrix(lifted, camera)
+    found = blended(start, end, 0.5, thing, document).matrix(lifted, camera)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@over("stands", [True, False])
+def test_what_is_turned_about_its_middle_goes_by_it(scene, stands):
+    """Its angles and its move are in the middle between those of both ends."""
+    document, thing = _told(scene, None)
+    thing = replace(thing, lifted=replace(scene.lifted, stands=stands))
+    start, end = Placement((3.0, 2.0), 0.1, (20.0, 0.0, 0.0)), Placement((3.0, 2.0), 0.1)
+    end = replace(end, turn=(-40.0, 30.0, 80.0), scale=4.0)
+    found = blended(start, end, 0.5, thing, document)
+    assert found == Placement((3.0, 2.0), 0.1, (-10.0, 15.0, 40.0), 2.0)
+    away = replace(start, move=(13.0, -6.0), depth=0.3)
+    found = blended(start, away, 0.5, thing, document)
+    assert found.move == (8.0, -2.0) and found.depth == pytest.approx(0.2)
+    assert (found.turn, found.scale) == (start.turn, 1.0)
+
+
+def _bowl(height: float, askew: float) -> F64:
+    """(N, 3) world, y down: a bowl of radius 1, `height` deep, that leans by `askew` degrees."""
+    radius, angle = np.meshgrid(np.linspace(0, 1, 25), np.linspace(0, 2 * np.pi, 73)[:-1])
+    deep = height * (1 - radius**2)
+    own = np.stack([radius * np.cos(angle), deep, radius * np.sin(angle)], -1).reshape(-1, 3)
+    return own @ turn_matrix(0.0, 0.0, askew).T + [0.4, 0.5, 5.0]
+
+
+@over("askew", [0.0, 15.0, -25.0])
+def test_a_shallow_thing_stands_on_all_that_it_covers(scene, askew):
+    """Lifted askew, it has its lowest points at one side, about which it would swing away."""
+    points, lifted = _bowl(0.3, askew), replace(scene.lifted, stands=True)
+    foot = foot_of(Placement(), points, lifted, scene.camera, DOWN)
+    middle = 0.5 * (points.min(0) + points.max(0))
+    np.testing.assert_allclose(foot[[0, 2]], middle[[0, 2]], atol=0.05)
+    assert points[:, 1].max() - foot[1] < 0.05 * np.ptp(points[:, 1])
+
+
+def test_a_tall_thing_stands_on_its_own_foot_at_one_side(scene):
+    points = np.concatenate([_bowl(0.3, 0.0), [[1.3, y, 5.0] for y in np.linspace(0.5, 4.0, 50)]])
+    lifted = replace(scene.lifted, stands=True)
+    foot = foot_of(Placement(), points, lifted, scene.camera, DOWN)
+    np.testing.assert_allclose(foot[[0, 2]], [1.3, 5.0], atol=1e-9)

@@ -8,11 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.deform.arap import ArapSolver, iterate
 from objectmorpher_core.deform.constraints import Constraints, Targets
 from objectmorpher_core.deform.deformer import ANCHORED_SHARE, FAITHFUL_ITERATIONS, Deformer
+from objectmorpher_core.deform.way import PoseWay
 from objectmorpher_core.document.model import Handle
-from objectmorpher_core.document.pose import UNHELD
+from objectmorpher_core.document.pose import UNHELD, Pose
 from objectmorpher_core.document.settings import DeformSettings
 from tests import shapes
 
@@ -275,3 +277,63 @@ def test_two_handles_close_together_part_as_far_as_they_are_told():
     for handle in (first, second):
         reached = deformer.skin_points(handle.point, pose).points[0]
         assert np.abs(reached - handle.target).max() < F64
+
+
+def _twisted(points: np.ndarray, most: float) -> Pose:
+    """Turned about the bar's own axis, from not at all at one end to `most` radians."""
+    angles = most * (points[:, 0] - points[:, 0].min()) / np.ptp(points[:, 0])
+    turns = np.array([matrix_from_vector(np.array([angle, 0.0, 0.0])) for angle in angles])
+    return Pose((turns @ points[:, :, None])[:, :, 0], turns)
+
+
+def _rigid(points: np.ndarray, vector: np.ndarray, move: np.ndarray) -> Pose:
+    turn = matrix_from_vector(vector)
+    return Pose(points @ turn.T + move, np.broadcast_to(turn, (len(points), 3, 3)))
+
+
+@pytest.mark.parametrize("degrees", [10.0, 90.0, 175.0])
+def test_the_way_between_two_poses_carries_round_what_turns(bar, degrees):
+    """Rigid at both ends it is rigid between, but for what a straight way of few degrees takes."""
+    points = bar.points - bar.points.mean(0)
+    first = _rigid(points, np.array([0.4, -1.0, 0.3]), np.zeros(3))
+    axis = np.array([0.0, 0.6, 0.8]) * np.radians(degrees)
+    again = matrix_from_vector(axis)
+    turns = again @ first.rotations
+    last = Pose(first.points @ again.T + [0.2, 0.1, 0.0], turns)
+    way = PoseWay(bar, first, last)
+    for share, pose in ((0.0, first), (1.0, last)):
+        found = way.at(share)
+        np.testing.assert_allclose(found.points, pose.points, atol=1e-9)
+        np.testing.assert_allclose(found.rotations, pose.rotations, atol=1e-9)
+    for share in (0.2, 0.5):
+        found = way.at(share)
+        turned = matrix_from_vector(share * axis) @ first.rotations[0]
+        np.testing.assert_allclose(found.rotations - turned, 0, atol=1e-9)
+        spread = found.points - found.points.mean(0)
+        assert np.abs(spread - points @ turned.T).max() < 0.01 * bar.diameter
+
+
+def test_two_sides_of_a_thing_do_not_part_ways_at_half_a_turn(bar):
+    """One end is twisted by 300 degrees, which are 60 the other way round."""
+    rest, last = bar.rest(), _twisted(bar.points, np.radians(300.0))
+    half = _twisted(bar.points, np.radians(150.0))
+    found = PoseWay(bar, rest, last).at(0.5)
+    np.testing.assert_allclose(found.rotations, half.rotations, atol=1e-9)
+    assert np.abs(found.points - half.points).max() < 0.02 * bar.diameter
+
+
+def test_what_stays_in_two_poses_stays_on_the_way_and_the_rest_bends(bar):
+    held = _at(bar, (-0.5, 0.0, 0.0))
+    held = replace(held, is_pin=True, turn=np.zeros(3))
+    bent = replace(_at(bar, (0.5, 0.0, 0.0), (-0.5, 0.5, 0.0)), turn=np.radians([0.0, 0.0, 150.0]))
+    last = bar.solve((held, bent)).pose
+    way = PoseWay(bar, bar.rest(), last)
+    is_still = np.linalg.norm(last.points - bar.points, axis=1) < 1e-9
+    assert is_still.sum() > 2
+    most = [bar.strain(pose).most.max() for pose in (last, way.at(0.25), way.at(0.5))]
+    assert max(most[1:]) < most[0]
+    for share in (0.25, 0.5, 0.75):
+        found = way.at(share)
+        gaps = np.linalg.norm(found.points - bar.points, axis=1)[is_still]
+        assert gaps.max() < 1e-3 * bar.diameter
+        assert bar.strain(found).least.min() > 0.5
