@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
-from objectmorpher_core.scripting.options import EditScript
+from objectmorpher_core.scripting.options import FINISH, EditScript, options_of
+from objectmorpher_core.scripting.script import beside, read_scripts
 from objectmorpher_research.evaluation.error import EvaluationError
 from objectmorpher_research.evaluation.paper.interaction_log import (
     Event,
@@ -202,12 +203,51 @@ def test_paths_of_annotations_do_not_lead_out_of_the_folder(tmp_path, small):
          "Turn it by 20° so that its front goes left and by 5° anticlockwise."),
         ({"scale": 0.5, "move": (0, 0, 2)},
          "Move the object 2 diameters away, scale it to 50% of its size."),
+        ({"spin": 30}, "Turn it where it stands by 30° so that its front goes left."),
+        ({"exposure": -1, "opacity": 0.4}, "Make it 40% opaque, make it 1 stop darker."),
+        ({"warmth": 0.3, "saturation": 0},
+         "Make its colours 30% warmer, make its colours 100% weaker."),
         ({"remove": True}, "Remove the object."),
         ({}, ""),
     ],
 )  # fmt: skip
 def test_guidance_in_words(script, told):
     assert words_of(EditScript(**script)) == told
+
+
+ASKED = {
+    "move": (10, -4, 0), "turn": (20, 0, 0), "spin": 30, "scale": 2, "opacity": 0.5,
+    "exposure": -1.5, "warmth": 0.2, "saturation": 1.5, "sharpness": 2, "blur": 3,
+    "blend_mode": "multiply",
+}  # fmt: skip
+
+
+def test_words_leave_out_nothing_of_how_a_thing_is_placed_and_finished():
+    assert options_of(FINISH) <= ASKED.keys()
+    every = words_of(EditScript(**ASKED)).lower()
+    for name, value in ASKED.items():
+        alone = words_of(EditScript(**{name: value})).lower().removesuffix(".")
+        assert alone and alone in every, name
+
+
+def test_a_copy_is_asked_for(own):
+    further = [{"duplicate": 1, "move": [-50, 0]}, {"duplicate": 1}]
+    script = {"mask": "m.png", "scale": 2, "objects": further}
+    (own / "cup" / "guidance.json").write_text(json.dumps(script))
+    cup, _ = read_subjects(own)
+    assert cup.guidance.words == (
+        "Scale it to 200% of its size. Add a copy of the object. Move the copy 50 px to the left."
+        " Add a copy of the object."
+    )
+
+
+def test_files_of_guidance_lie_beside_it_as_those_of_a_script_do(own):
+    script = {"mask": "m.png", "hidden": "h.png", "more_views": [{"photo": "side.jpg"}]}
+    path = own / "cup" / "guidance.json"
+    path.write_text(json.dumps(script))
+    cup, _ = read_subjects(own)
+    (item,) = read_scripts(path)
+    assert cup.guidance.item == beside(item, path.parent)
 
 
 def test_an_input_waits_for_the_next_feedback():
