@@ -14,6 +14,7 @@ from objectmorpher_core.pictures.image import Picture, encode_mask, encode_pictu
 from objectmorpher_core.scripting.options import FINISH, EditScript, options_of
 from objectmorpher_core.scripting.script import beside, read_scripts
 from objectmorpher_research.evaluation.error import EvaluationError
+from objectmorpher_research.evaluation.paper import table
 from objectmorpher_research.evaluation.paper.interaction_log import (
     Event,
     encode_events,
@@ -317,6 +318,18 @@ def test_the_window_s_frames_tell_how_soon_a_drag_is_seen(tmp_path):
                 read_frames(path)
 
 
+@pytest.mark.parametrize("ending", [".png", ".jxl", ".avif"])
+def test_results_of_another_shape_than_the_photo_are_named_whatever_its_format(
+    tmp_path, coffee, ending
+):
+    photo = np.ascontiguousarray(coffee[:40, :60])
+    folder = tmp_path / "cup"
+    for name, pixels in (("same", photo), ("turned", np.rot90(photo)), ("half", photo[::2, ::2])):
+        save(folder / "results" / f"{name}.png", pixels)
+    (folder / f"image{ending}").write_bytes(encode_picture(Picture(photo), ending))
+    assert set(table._resized(read_subjects(tmp_path))) == {"turned: cup", "half: cup"}
+
+
 def test_the_paper_s_table(own, small, monkeypatch):
     """Nothing done is the best of all by every measure; what cannot be taken is named."""
     from objectmorpher_research.evaluation.measures import dino
@@ -329,15 +342,15 @@ def test_the_paper_s_table(own, small, monkeypatch):
     )
     frames = [frame(0, 0.01, 1), frame(0.02, 0.03, 2), frame(0.04, 0.05, 3)]
     (own / "cup" / "results" / "half.frames.json").write_text(json.dumps(frames))
-    table = measure_paper(read_subjects(own))
-    rows = {row.method: row for row in table.rows}
+    found = measure_paper(read_subjects(own))
+    rows = {row.method: row for row in found.rows}
     assert set(rows) == {NOTHING, "faint", "half"}
     assert rows[NOTHING].scores["DINO-identity"].value == pytest.approx(1)
     assert rows["faint"].scores["DINO-perceptual"].value > 0.001
-    assert rows["half"].subjects == ("cup",) and table.resized == ("half: cup",)
+    assert rows["half"].subjects == ("cup",) and found.resized == ("half: cup",)
     assert rows["half"].computing is not None and rows["half"].computing.value == 3
     assert rows["half"].latency is not None
     assert rows["half"].latency.value == pytest.approx(0.03)
     assert rows["faint"].computing is None and rows["faint"].latency is None
-    absent = {left.metric for left in table.lacking}
+    absent = {left.metric for left in found.lacking}
     assert {COLUMNS[c] for c in ("LPIPS", "SIFID", "KID")} <= absent
