@@ -6,6 +6,7 @@ A mask beside a picture, `NAME.mask.png`, is used instead of looking for the sub
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -86,10 +87,13 @@ def find_pairs(source: Path, how: SourceReading | None = None) -> tuple[SourcePa
 
 
 def fingerprint(pairs: tuple[SourcePair, ...]) -> str:
-    """SHA-256 of which pairs there are, wherever the folder lies."""
+    """SHA-256 of which pairs there are and how they are read, wherever the folder lies."""
     told = hashlib.sha256()
     for pair in pairs:
-        told.update(f"{pair.name}\0{pair.problem}\0{pair.b.index}\0{pair.a.index}\n".encode())
+        facts: list[Any] = [pair.name, pair.problem]
+        for picture, mask in ((pair.b, pair.mask_b), (pair.a, pair.mask_a)):
+            facts += [picture.index, picture.half, picture.padding, bool(mask)]
+        told.update(json.dumps(facts).encode())
     return told.hexdigest()
 
 
