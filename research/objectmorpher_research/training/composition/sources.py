@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -25,6 +26,7 @@ VIDEOS = {".mp4", ".webm", ".mov", ".mkv", ".avi", ".m4v"}
 LAYOUTS = ("auto", "subjects", "pairs", "frames")
 ONE_OF_TWO = re.compile(r"(.+?)[._-]?([ab])", re.IGNORECASE)
 MASK = ".mask"
+NAMED = 80  # bytes of a name that are kept: with all that comes after them a file may have 255
 
 
 @dataclass(frozen=True)
@@ -178,5 +180,10 @@ def _frames(video: Path, how: SourceReading) -> Iterator[SourcePair]:
 
 
 def _safe(name: str) -> str:
-    """Fit for a file's name everywhere."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:80] or "pair"
+    """Fit for a file's name everywhere; if more than spaces is lost, with a hash of the whole."""
+    whole = unicodedata.normalize("NFC", name)
+    kept = re.sub(r"[^\w-]+", "-", whole).encode()[:NAMED].decode(errors="ignore")
+    if kept and kept == whole.replace(" ", "-"):
+        return kept
+    digest = hashlib.sha256(whole.encode(errors="surrogatepass")).hexdigest()
+    return f"{kept}-{digest[:8]}"

@@ -125,6 +125,34 @@ def test_folders_of_pairs_with_masks(tmp_path):
     assert pair_from(json.loads(json.dumps(asdict(mug)))) == mug
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("кружка", "чашка", "чаш ка"), ("茶" * 60, "茶" * 60 + "碗"), ("मग", "मेग", "मिग"),
+        ("!", "?", "🏺"), ("mug" * 40, "mug" * 40 + "s"), ("mug (1)", "mug [1]", "mug 1"),
+    ],
+)  # fmt: skip
+def test_pairs_have_names_of_their_own_that_any_disk_takes(tmp_path, names):
+    for where in (tmp_path / "pairs", tmp_path / "pairs" / ("täglich " * 20)):
+        for name in names:
+            write(where / f"{name}-a.png", two_halves()[1])
+            write(where / f"{name}-b.png", two_halves()[2])
+    found = find_pairs(tmp_path / "pairs")
+    assert len(found) == 4 * len(names)
+    for pair in found:
+        assert not set(pair.name) & set('/\\?*:<>|" ')
+        write(tmp_path / "out" / f".{pair.name}.coarse.png.12345678.unfinished", two_halves()[1])
+    assert len(list((tmp_path / "out").iterdir())) == len(found)
+
+
+def test_a_name_of_letters_in_any_script_is_kept(tmp_path):
+    for name in ("кружка", "mug 1", "Krüge", "茶碗_2"):
+        for side in "ab":
+            write(tmp_path / f"{name}-{side}.png", two_halves()[1])
+    names = {pair.name for pair in find_pairs(tmp_path, ONE_WAY)}
+    assert names == {"кружка", "mug-1", "Krüge", "茶碗_2"}
+
+
 def test_pairs_that_are_read_in_another_way_are_others(tmp_path):
     """A folder of triplets is gone on with by the same pairs only, wherever their pictures lie."""
     for home in ("one", "two"):
