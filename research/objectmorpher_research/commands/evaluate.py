@@ -60,6 +60,7 @@ def _add_metrics(metrics: argparse.ArgumentParser) -> None:
 
 def _run_metrics(options: argparse.Namespace) -> None:
     """Measures, prints a table, writes the figures."""
+    from objectmorpher.cli.commands import check_outputs
     from objectmorpher_core.base.files import write_all
 
     from ..evaluation.measures.mmd import Subsets
@@ -71,6 +72,8 @@ def _run_metrics(options: argparse.Namespace) -> None:
     check_ray(options)
     if options.weights is not None and not options.weights.is_dir():
         raise UsageError(f"there is no folder {options.weights}")
+    if options.json is not None:
+        check_outputs([options.a, options.b], {options.json: (options.json.suffix.lower(),)})
     only = tuple(w.strip() for w in options.only.split(",") if w.strip()) if options.only else ()
     subsets = Subsets(options.subsets, options.subset_size, options.seed)
     pairs = find_pairs(options.a, options.b, options.mask)

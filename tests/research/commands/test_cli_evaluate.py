@@ -88,6 +88,9 @@ def test_two_files(sets, capsys):
         (["{a}", "{fewer}"], "has no picture called 'chelsea'"),
         (["{a}/coffee.png", "{small}"], "different sizes"),
         (["{a}/coffee.png", "{broken}"], "broken.png"),
+        (["{a}", "{b}", "--json", "{nowhere}/x.json"], "nowhere does not exist"),
+        (["{a}", "{b}", "--json", "{empty}"], "empty is a folder"),
+        (["{a}/coffee.png", "{b}/coffee.png", "--json", "{b}/coffee.png"], "is an input"),
     ],
 )
 def test_failures_are_one_sentence(sets, tmp_path, capsys, words, told):
