@@ -416,6 +416,8 @@ def check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> N
             raise UsageError(f"{path} is an input; choose another name for the output")
         if path.suffix.lower() not in endings:
             raise UsageError(f"{path}: the ending must be {' or '.join(endings)}")
+        if path.is_dir():
+            raise UsageError(f"{path} is a folder, not a file")
         if not path.parent.is_dir():
             raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
 

@@ -19,9 +19,11 @@ def add_bench(parser: argparse.ArgumentParser) -> None:
 
 def run_bench(options: argparse.Namespace) -> None:
     """Print the figures of one benchmark, or write them into a file."""
-    from objectmorpher.cli.commands import json_bytes
+    from objectmorpher.cli.commands import check_outputs, json_bytes
     from objectmorpher_core.base.files import write_all
 
+    if options.json:
+        check_outputs([], {options.json: (options.json.suffix.lower(),)})
     encoded = json_bytes(figures(options.what, options.quick))
     if options.json:
         write_all({options.json: encoded})

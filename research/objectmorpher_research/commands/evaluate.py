@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 NAME, CELL = 26, 26  # characters of the table's columns
 FORMAT = ".4g"
+NAMED = 8  # pairs of which one line tells the names
 
 
 def add_evaluate(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +60,7 @@ def _add_metrics(metrics: argparse.ArgumentParser) -> None:
 
 def _run_metrics(options: argparse.Namespace) -> None:
     """Measures, prints a table, writes the figures."""
+    from objectmorpher.cli.commands import check_outputs
     from objectmorpher_core.base.files import write_all
 
     from ..evaluation.measures.mmd import Subsets
@@ -69,6 +72,8 @@ def _run_metrics(options: argparse.Namespace) -> None:
     check_ray(options)
     if options.weights is not None and not options.weights.is_dir():
         raise UsageError(f"there is no folder {options.weights}")
+    if options.json is not None:
+        check_outputs([options.a, options.b], {options.json: (options.json.suffix.lower(),)})
     only = tuple(w.strip() for w in options.only.split(",") if w.strip()) if options.only else ()
     subsets = Subsets(options.subsets, options.subset_size, options.seed)
     pairs = find_pairs(options.a, options.b, options.mask)
@@ -98,7 +103,18 @@ def table(results: Results) -> str:
     for reason in dict.fromkeys(left.reason for left in results.lacking):
         names = ", ".join(left.metric for left in results.lacking if left.reason == reason)
         lines.append(f"not taken: {names}: {reason}")
+    for region in regions[1:]:  # the first is the whole picture
+        if empty := _without(results, region):
+            more = f" and {len(empty) - NAMED} more" if len(empty) > NAMED else ""
+            names = ", ".join(empty[:NAMED]) + more
+            lines.append(f"nothing to measure {region} the mask, which is white inside: {names}")
     return "".join(line.rstrip() + "\n" for line in lines)
+
+
+def _without(results: Results, region: str) -> list[str]:
+    """Names of the pairs of which no measure has a value there."""
+    found = [score.each for score in results.scores if score.region == region]
+    return [name for name in found[0] if all(math.isnan(each[name]) for each in found)]
 
 
 def as_json(results: Results) -> dict[str, Any]:

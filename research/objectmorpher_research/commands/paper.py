@@ -45,6 +45,7 @@ def add_paper(parser: argparse.ArgumentParser) -> None:
 
 def run_paper(options: argparse.Namespace) -> None:
     """Measures, prints the table, writes the figures."""
+    from objectmorpher.cli.commands import check_outputs
     from objectmorpher_core.base.files import write_all
 
     from ..evaluation.paper.table import measure_paper
@@ -54,6 +55,8 @@ def run_paper(options: argparse.Namespace) -> None:
         raise UsageError("--seed is at least 0")
     if options.weights is not None and not options.weights.is_dir():
         raise UsageError(f"there is no folder {options.weights}")
+    if options.json is not None:
+        check_outputs([], {options.json: (options.json.suffix.lower(),)})
     check_ray(options)
     if options.ray is not None and options.ours is None:
         raise UsageError("--ray spreads what --run edits; without --run there is nothing to spread")

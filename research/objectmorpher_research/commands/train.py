@@ -178,6 +178,7 @@ def _make_pairs(options: argparse.Namespace) -> None:
         seed=options.seed, limits=TripletLimits(**least),
     )  # fmt: skip
     how.check()
+    _check_folder(options.out)
     if options.made:
         _made_up(options)
     padding = PADDING if options.padding is None else options.padding
@@ -220,6 +221,7 @@ def _train_lora(options: argparse.Namespace) -> None:
     least = min(options.steps, options.save_every)
     if least < 1 or min(options.look_every, options.sample_steps) < 0:
         raise UsageError("--steps and --save-every are at least 1, the others not negative")
+    _check_folder(options.out)
     from ..training.composition.train_lora import Course, Trainer, TrainingFolders
 
     weights = edit_models.folder_of(model, options.weights)
@@ -303,6 +305,13 @@ def _check_installed() -> None:
         raise UsageError(f"training needs {absent}: `pip install {absent.replace(' and ', ' ')}`")
 
 
+def _check_folder(folder: Path) -> None:
+    """Refuses, before any work, a folder that is none or cannot be made."""
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise UsageError(f"{there} is a file, not a folder")
+
+
 def _train_shadow(options: argparse.Namespace) -> None:
     """Makes scenes, trains, and writes weights."""
     _check_installed()
@@ -310,6 +319,7 @@ def _train_shadow(options: argparse.Namespace) -> None:
         raise UsageError("--scenes and --steps are at least 1, --seed is not negative")
     from ..training.train_shadow import ShadowPlan, export, train
 
+    _check_folder(options.folder)
     plan = ShadowPlan(options.scenes, options.steps, seed=options.seed, grounds=options.grounds)
     with progress_bar("training") as progress:
         net = train(options.folder, plan, options.minutes, progress, options.start)
@@ -324,6 +334,7 @@ def _train_rods(options: argparse.Namespace) -> None:
         raise UsageError("--samples and --steps are at least 1, --seed is not negative")
     from ..training.train_rods import RodPlan, export, train
 
+    _check_folder(options.folder)
     plan = RodPlan(options.samples, options.steps, seed=options.seed)
     with progress_bar("training") as progress:
         net, off = train(options.folder, plan, progress)
@@ -353,6 +364,7 @@ def _train_shape(options: argparse.Namespace) -> None:
         raise UsageError(f"there is no family {unknown[0]!r}; there are {', '.join(FAMILIES)}")
     if options.start is not None and not options.start.is_file():
         raise UsageError(f"there is no file {options.start}")
+    _check_folder(options.folder)
     plan = TrainingPlan(
         options.samples, options.passes, held_out=held_out, seed=options.seed, also=tuple(also)
     )
@@ -382,6 +394,7 @@ def _train_flat(options: argparse.Namespace) -> None:
         raise UsageError(f"there is no file {start}")
     if options.things < 3:
         raise UsageError("--things: at least 3, one of each kind")
+    _check_folder(options.folder)
     weights = options.output or options.folder / "shape.onnx"
     with progress_bar("what is flat") as progress:
         found = train_flat(options.folder, options.things, start, weights, progress)

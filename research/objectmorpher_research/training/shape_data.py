@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +71,13 @@ def write_arrays(file: Path, arrays: dict[str, np.ndarray]) -> None:
     partial.rename(file)
 
 
+def shard_name(seed: int, families: tuple[str, ...] | None = None, takes: int = 1) -> str:
+    """The file's name; samples of one seed may lie beside others of other families or takes."""
+    drawn = f"{','.join(families or ())} {takes}"
+    ending = f"-{sha256(drawn.encode()).hexdigest()[:8]}" if families or takes > 1 else ""
+    return f"{seed:08d}{ending}.npz"
+
+
 def write_shards(
     folder: Path, first: int, count: int, progress: Progress = silent,
     families: tuple[str, ...] | None = None, takes: int = 1,
@@ -80,7 +88,7 @@ def write_shards(
     """
     folder.mkdir(parents=True, exist_ok=True)
     jobs = [
-        (folder / f"{seed:08d}.npz", range(seed, seed + SHARD), families, takes)
+        (folder / shard_name(seed, families, takes), range(seed, seed + SHARD), families, takes)
         for seed in range(first, first + count, SHARD)
     ]
     return make_files(_write, jobs, (SHARD, "samples"), progress)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,18 @@ def test_the_report_has_the_seconds_that_the_design_names(tmp_path: Path) -> Non
         used = [seconds[stage] for stage in ("load", "segment", "lift", "inpaint", "render")]
         assert min(used) > 0, "the whole edit was done"
     assert first["mask_area_px"] == again["mask_area_px"], "the same edit again"
+
+
+@pytest.mark.parametrize(("file", "told"), [("none/b.json", "does not exist"), ("", "is a folder")])
+def test_a_file_that_cannot_be_written_is_refused_before_anything_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    file: str, told: str,
+) -> None:  # fmt: skip
+    needed = "objectmorpher_research.bench.deform"  # by what measures, which alone imports it
+    monkeypatch.delitem(sys.modules, needed, raising=False)
+    assert cli.main(["bench", "deform", "--quick", "--json", str(tmp_path / file)]) == 1
+    assert told in capsys.readouterr().err
+    assert needed not in sys.modules
 
 
 @pytest.mark.parametrize("name", pipeline.PHOTOS[1:])

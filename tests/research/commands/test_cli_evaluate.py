@@ -50,6 +50,24 @@ def test_two_folders_and_masks_give_a_table_and_figures(sets, tmp_path, capsys):
     assert [line.split()[0] for line in lines[1:]] == ["psnr", "ssim"]
 
 
+@pytest.mark.parametrize("region", ["inside", "outside"])
+def test_masks_that_leave_nothing_to_measure_are_named(sets, tmp_path, capsys, region):
+    """As those are whose values are 0 and 1, of which nothing is white."""
+    a, b, masks = map(str, sets)
+    words = ["evaluate", "metrics", a, b, "--mask", masks, "--only", NUMBERS]
+    assert cli.main(words) == 0
+    assert "nothing to measure" not in capsys.readouterr().out
+    low, high = (0, 1) if region == "inside" else (254, 255)
+    for name in ("chelsea", "flower"):
+        grey = np.full((120, 160, 3), low, np.uint8)
+        grey[:, :80] = high
+        (sets[2] / f"{name}.png").write_bytes(encode_picture(Picture(grey), ".png"))
+    assert cli.main(words) == 0
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if "nothing to" in one]
+    assert line.startswith(f"nothing to measure {region} the mask")
+    assert line.endswith(": chelsea, flower")
+
+
 def test_two_files(sets, capsys):
     a, b, _ = sets
     words = ["evaluate", "metrics", str(a / "coffee.png"), str(b / "coffee.png")]
@@ -70,6 +88,9 @@ def test_two_files(sets, capsys):
         (["{a}", "{fewer}"], "has no picture called 'chelsea'"),
         (["{a}/coffee.png", "{small}"], "different sizes"),
         (["{a}/coffee.png", "{broken}"], "broken.png"),
+        (["{a}", "{b}", "--json", "{nowhere}/x.json"], "nowhere does not exist"),
+        (["{a}", "{b}", "--json", "{empty}"], "empty is a folder"),
+        (["{a}/coffee.png", "{b}/coffee.png", "--json", "{b}/coffee.png"], "is an input"),
     ],
 )
 def test_failures_are_one_sentence(sets, tmp_path, capsys, words, told):

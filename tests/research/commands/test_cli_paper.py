@@ -113,6 +113,7 @@ def test_our_own_method_is_run_and_timed(folder, tmp_path, capsys):
         (["paper", "{set}", "--weights", "{nowhere}"], "there is no folder"),
         (["paper", "{set}", "--seed", "-1"], "--seed is at least 0"),
         (["paper", "{broken}"], "guidance.json"),
+        (["paper", "{set}", "--json", "{nowhere}/x.json"], "nowhere does not exist"),
         (["paper", "{bare}", "--run", "{nowhere}"], "none of the subjects could be edited: cup: "),
         (["study", "{bare}"], "has no result of any method"),
         (["study", "{silent}"], "nothing tells what is asked"),
@@ -136,6 +137,7 @@ def test_failures_are_one_sentence(folder, tmp_path, capsys, words, told):
     assert cli.main(["evaluate", *filled]) == 1
     said = capsys.readouterr()
     assert told in said.err and len(said.err.splitlines()) == 1
+    assert words[0] != "paper" or not said.out, "nothing was measured"
 
 
 def test_what_people_said(tmp_path, capsys):

@@ -52,13 +52,27 @@ def test_pairs_are_told_of_and_not_looked_at_twice(tmp_path, capsys):
     (["pairs", "PAIRS", "OUT", "--segment", "nobody"], "there is no segmenter 'nobody'"),
     (["pairs", "PAIRS", "OUT", "--size", "10"], "--size is at least 64 px"),
     (["pairs", "PAIRS", "PAIRS"], "is not empty"),
+    (["pairs", "PAIRS", "FILE"], "thing0-a.png is a file, not a folder"),
 ])  # fmt: skip
 def test_what_cannot_be_made_is_one_sentence(tmp_path, capsys, arguments, words):
     names = {"NONE": tmp_path / "none", "OUT": tmp_path / "out"}
     names["PAIRS"] = write_pairs(tmp_path / "pairs")
+    names["FILE"] = names["PAIRS"] / "thing0-a.png"
     assert main(["train", *(str(names.get(word, word)) for word in arguments)]) != 0
     told = capsys.readouterr().err
     assert words in told and told.count("\n") == 1 and "Traceback" not in told
+
+
+@needs_torch
+@pytest.mark.parametrize("what", ["shape", "flat", "shadow", "rods", "lora"])
+@pytest.mark.parametrize("within", ["", "folder"])
+def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path, capsys, what, within):
+    pytest.importorskip("onnx")
+    file = tmp_path / "notes.txt"
+    file.write_text("mine")
+    where = [str(file), str(file / within)] if what == "lora" else ["--folder", str(file / within)]
+    assert main(["train", what, *where]) == 1
+    assert capsys.readouterr().err == f"objectmorpher: {file} is a file, not a folder\n"
 
 
 @needs_torch

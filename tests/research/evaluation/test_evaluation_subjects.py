@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
-from objectmorpher_core.scripting.options import EditScript
+from objectmorpher_core.scripting.options import FINISH, EditScript, options_of
+from objectmorpher_core.scripting.script import beside, read_scripts
 from objectmorpher_research.evaluation.error import EvaluationError
+from objectmorpher_research.evaluation.paper import table
 from objectmorpher_research.evaluation.paper.interaction_log import (
     Event,
     encode_events,
@@ -202,12 +204,51 @@ def test_paths_of_annotations_do_not_lead_out_of_the_folder(tmp_path, small):
          "Turn it by 20° so that its front goes left and by 5° anticlockwise."),
         ({"scale": 0.5, "move": (0, 0, 2)},
          "Move the object 2 diameters away, scale it to 50% of its size."),
+        ({"spin": 30}, "Turn it where it stands by 30° so that its front goes left."),
+        ({"exposure": -1, "opacity": 0.4}, "Make it 40% opaque, make it 1 stop darker."),
+        ({"warmth": 0.3, "saturation": 0},
+         "Make its colours 30% warmer, make its colours 100% weaker."),
         ({"remove": True}, "Remove the object."),
         ({}, ""),
     ],
 )  # fmt: skip
 def test_guidance_in_words(script, told):
     assert words_of(EditScript(**script)) == told
+
+
+ASKED = {
+    "move": (10, -4, 0), "turn": (20, 0, 0), "spin": 30, "scale": 2, "opacity": 0.5,
+    "exposure": -1.5, "warmth": 0.2, "saturation": 1.5, "sharpness": 2, "blur": 3,
+    "blend_mode": "multiply",
+}  # fmt: skip
+
+
+def test_words_leave_out_nothing_of_how_a_thing_is_placed_and_finished():
+    assert options_of(FINISH) <= ASKED.keys()
+    every = words_of(EditScript(**ASKED)).lower()
+    for name, value in ASKED.items():
+        alone = words_of(EditScript(**{name: value})).lower().removesuffix(".")
+        assert alone and alone in every, name
+
+
+def test_a_copy_is_asked_for(own):
+    further = [{"duplicate": 1, "move": [-50, 0]}, {"duplicate": 1}]
+    script = {"mask": "m.png", "scale": 2, "objects": further}
+    (own / "cup" / "guidance.json").write_text(json.dumps(script))
+    cup, _ = read_subjects(own)
+    assert cup.guidance.words == (
+        "Scale it to 200% of its size. Add a copy of the object. Move the copy 50 px to the left."
+        " Add a copy of the object."
+    )
+
+
+def test_files_of_guidance_lie_beside_it_as_those_of_a_script_do(own):
+    script = {"mask": "m.png", "hidden": "h.png", "more_views": [{"photo": "side.jpg"}]}
+    path = own / "cup" / "guidance.json"
+    path.write_text(json.dumps(script))
+    cup, _ = read_subjects(own)
+    (item,) = read_scripts(path)
+    assert cup.guidance.item == beside(item, path.parent)
 
 
 def test_an_input_waits_for_the_next_feedback():
@@ -277,6 +318,18 @@ def test_the_window_s_frames_tell_how_soon_a_drag_is_seen(tmp_path):
                 read_frames(path)
 
 
+@pytest.mark.parametrize("ending", [".png", ".jxl", ".avif"])
+def test_results_of_another_shape_than_the_photo_are_named_whatever_its_format(
+    tmp_path, coffee, ending
+):
+    photo = np.ascontiguousarray(coffee[:40, :60])
+    folder = tmp_path / "cup"
+    for name, pixels in (("same", photo), ("turned", np.rot90(photo)), ("half", photo[::2, ::2])):
+        save(folder / "results" / f"{name}.png", pixels)
+    (folder / f"image{ending}").write_bytes(encode_picture(Picture(photo), ending))
+    assert set(table._resized(read_subjects(tmp_path))) == {"turned: cup", "half: cup"}
+
+
 def test_the_paper_s_table(own, small, monkeypatch):
     """Nothing done is the best of all by every measure; what cannot be taken is named."""
     from objectmorpher_research.evaluation.measures import dino
@@ -289,15 +342,15 @@ def test_the_paper_s_table(own, small, monkeypatch):
     )
     frames = [frame(0, 0.01, 1), frame(0.02, 0.03, 2), frame(0.04, 0.05, 3)]
     (own / "cup" / "results" / "half.frames.json").write_text(json.dumps(frames))
-    table = measure_paper(read_subjects(own))
-    rows = {row.method: row for row in table.rows}
+    found = measure_paper(read_subjects(own))
+    rows = {row.method: row for row in found.rows}
     assert set(rows) == {NOTHING, "faint", "half"}
     assert rows[NOTHING].scores["DINO-identity"].value == pytest.approx(1)
     assert rows["faint"].scores["DINO-perceptual"].value > 0.001
-    assert rows["half"].subjects == ("cup",) and table.resized == ("half: cup",)
+    assert rows["half"].subjects == ("cup",) and found.resized == ("half: cup",)
     assert rows["half"].computing is not None and rows["half"].computing.value == 3
     assert rows["half"].latency is not None
     assert rows["half"].latency.value == pytest.approx(0.03)
     assert rows["faint"].computing is None and rows["faint"].latency is None
-    absent = {left.metric for left in table.lacking}
+    absent = {left.metric for left in found.lacking}
     assert {COLUMNS[c] for c in ("LPIPS", "SIFID", "KID")} <= absent

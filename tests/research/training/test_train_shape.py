@@ -25,6 +25,7 @@ from objectmorpher_research.training.shape_net import (  # noqa: E402
     WIDTH,
     ShapeNet,
 )
+from objectmorpher_research.training.shapes.families import FAMILIES  # noqa: E402
 from objectmorpher_research.training.shapes.sample import make_sample  # noqa: E402
 
 COUNT = 4
@@ -176,11 +177,22 @@ def test_training_goes_on_from_exported_weights(tmp_path):
 
 
 def test_a_set_of_samples_has_the_families_asked_for(tmp_path, networks, monkeypatch):
+    """Though others of the same seed are there."""
     monkeypatch.setattr(shape_data, "SHARD", 2)
-    shape_data.write_shards(tmp_path, 2_000_000, 2, families=("prints",))
-    found = np.load(tmp_path / "02000000.npz")
+    for families, takes in ((None, 1), (("rings",), 1), (("prints",), 2)):
+        (tmp_path / shape_data.shard_name(2_000_000, families, takes)).write_bytes(b"others")
+    (file,) = shape_data.write_shards(tmp_path, 2_000_000, 2, families=("prints",))
+    found = np.load(file)
     assert found["family"].tolist() == ["prints"] * 2
     assert found["tokens"].shape == found[shape_data.MIRRORED].shape == (2, WIDTH, GRID, GRID)
+
+
+def test_files_of_samples_have_one_name_only_if_they_hold_the_same():
+    own = [*((name,) for name in FAMILIES), ("prints", "rings"), ("rings", "prints")]
+    kinds = [(families, takes) for families in (None, *own) for takes in (1, 2, 3)]
+    names = {shape_data.shard_name(seed, *kind) for seed in (0, 45_000_000) for kind in kinds}
+    assert len(names) == 2 * len(kinds)
+    assert shape_data.shard_name(32) == shape_data.shard_name(32, ()) == "00000032.npz"
 
 
 @pytest.mark.slow

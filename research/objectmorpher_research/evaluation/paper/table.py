@@ -131,13 +131,11 @@ def _timing(
 
 
 def _resized(subjects: Sequence[EvaluatedEdit]) -> tuple[str, ...]:
-    """Whose results have another size than the photo. Reads headers only, by Pillow."""
-    from PIL import Image
-
+    """Whose results have another size than the photo, both upright."""
     told = []
     for subject in subjects:
+        size = read_pixels(subject.image).shape
         for method, result in subject.results.items():
-            with Image.open(subject.image) as a, Image.open(result.picture) as b:
-                if sorted(a.size) != sorted(b.size):  # EXIF may turn them
-                    told.append(f"{method}: {subject.name}")
+            if read_pixels(result.picture).shape != size:
+                told.append(f"{method}: {subject.name}")
     return tuple(told)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from objectmorpher_core.pictures.image import ImageError, read_picture
-from objectmorpher_core.scripting.options import XY, EditScript, ScriptError
-from objectmorpher_core.scripting.script import BatchItem, parse_scripts
+from objectmorpher_core.scripting.options import NORMAL, XY, EditScript, ScriptError
+from objectmorpher_core.scripting.script import BatchItem, beside, parse_scripts
 
 from ..error import EvaluationError
 
@@ -48,12 +49,12 @@ def read_guidance(path: Path) -> EditGuidance:
         raise EvaluationError(f"{path}: {told}") from error
     if not isinstance(text, str):
         raise EvaluationError(f"{path}: {TEXT!r} is no text")
-    return from_item(_beside(item, path.parent), text)
+    return from_item(beside(item, path.parent), text)
 
 
 def from_item(item: BatchItem, text: str = "") -> EditGuidance:
     """Read an edit script; without a `text` its placement is put into words."""
-    words = text or " ".join(words_of(script) for script in _scripts(item))
+    words = text or " ".join(filter(None, _sentences(item)))
     arrows = tuple(arrow for script in _scripts(item) for arrow in arrows_of(script))
     return EditGuidance(arrows, words.strip(), item=item, reason="")
 
@@ -68,10 +69,20 @@ def arrows_of(script: EditScript) -> tuple[Arrow, ...]:
     return tuple(arrows)
 
 
-def words_of(script: EditScript) -> str:
-    """Return the placement of the whole object in words for someone who looks at the photo."""
+def _sentences(item: BatchItem) -> Iterator[str]:
+    yield words_of(item.script)
+    for further in item.others.objects:
+        if further.duplicate is None:
+            yield words_of(further.script)
+        else:
+            yield "Add a copy of the object."
+            yield words_of(further.script, "the copy")
+
+
+def words_of(script: EditScript, thing: str = "the object") -> str:
+    """Return how a whole thing is placed and finished, for someone who looks at the photo."""
     if script.remove:
-        return "Remove the object."
+        return f"Remove {thing}."
     told = []
     if script.move is not None:
         dx, dy, dz = script.move
@@ -81,17 +92,39 @@ def words_of(script: EditScript) -> str:
             told += _way(dx, "to the right", "to the left", " px")
             told += _way(dy, "down", "up", " px")
         told += _way(dz, "diameters away", "diameters nearer", "")
-    told = ["move the object " + " and ".join(told)] if told else []
+    told = [f"move {thing} " + " and ".join(told)] if told else []
+    # A positive spin or yaw takes what faces us to the left.
+    sideways = "so that its front goes left", "so that its front goes right", "°"
+    told += [f"turn it where it stands by {way}" for way in _way(script.spin, *sideways)]
     if script.turn is not None:
-        yaw, pitch, roll = script.turn  # positive yaw takes what faces us to the left
-        turned = _way(yaw, "so that its front goes left", "so that its front goes right", "°")
+        yaw, pitch, roll = script.turn
+        turned = _way(yaw, *sideways)
         turned += _way(pitch, "so that its top comes nearer", "so that its top goes away", "°")
         turned += _way(roll, "clockwise", "anticlockwise", "°")
         told += ["turn it by " + " and by ".join(turned)] if turned else []
     if script.scale is not None and script.scale != 1:
         told.append(f"scale it to {script.scale:.0%} of its size")
-    sentence = ", ".join(told)
-    return sentence[:1].upper() + sentence[1:] + "." if told else ""
+    sentence = ", ".join([*told, *_finish(script)])
+    return sentence[:1].upper() + sentence[1:] + "." if sentence else ""
+
+
+def _finish(script: EditScript) -> Iterator[str]:
+    """What is done to its colours, in words."""
+    if script.opacity != 1:
+        yield f"make it {100 * script.opacity:g}% opaque"
+    stops = "stop" if abs(script.exposure) == 1 else "stops"
+    for way in _way(script.exposure, "brighter", "darker", f" {stops}"):
+        yield f"make it {way}"
+    for way in _way(100 * script.warmth, "warmer", "cooler", "%"):
+        yield f"make its colours {way}"
+    for way in _way(100 * (script.saturation - 1), "stronger", "weaker", "%"):
+        yield f"make its colours {way}"
+    if script.sharpness:
+        yield f"sharpen it by {100 * script.sharpness:g}%"
+    if script.blur:
+        yield f"blur it by {script.blur:g} px"
+    if script.blend_mode != NORMAL:
+        yield f"mix it with what is behind it ({script.blend_mode})"
 
 
 def _middle(script: EditScript) -> XY | None:
@@ -114,18 +147,3 @@ def _way(value: float, more: str, less: str, unit: str) -> list[str]:
 
 def _scripts(item: BatchItem) -> tuple[EditScript, ...]:
     return item.script, *(further.script for further in item.others.objects)
-
-
-def _beside(item: BatchItem, folder: Path) -> BatchItem:
-    """Its files are named relative to the guidance."""
-
-    def own(script: EditScript) -> EditScript:
-        named = {
-            name: str(folder / value)
-            for name in ("mask", "front_mask", "hidden", "splats")
-            if (value := getattr(script, name)) is not None
-        }
-        return replace(script, **named)
-
-    objects = tuple(replace(o, script=own(o.script)) for o in item.others.objects)
-    return replace(item, script=own(item.script), others=replace(item.others, objects=objects))

@@ -6,7 +6,9 @@ A mask beside a picture, `NAME.mask.png`, is used instead of looking for the sub
 from __future__ import annotations
 
 import hashlib
+import json
 import re
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -24,6 +26,7 @@ VIDEOS = {".mp4", ".webm", ".mov", ".mkv", ".avi", ".m4v"}
 LAYOUTS = ("auto", "subjects", "pairs", "frames")
 ONE_OF_TWO = re.compile(r"(.+?)[._-]?([ab])", re.IGNORECASE)
 MASK = ".mask"
+NAMED = 80  # bytes of a name that are kept: with all that comes after them a file may have 255
 
 
 @dataclass(frozen=True)
@@ -86,10 +89,13 @@ def find_pairs(source: Path, how: SourceReading | None = None) -> tuple[SourcePa
 
 
 def fingerprint(pairs: tuple[SourcePair, ...]) -> str:
-    """SHA-256 of which pairs there are, wherever the folder lies."""
+    """SHA-256 of which pairs there are and how they are read, wherever the folder lies."""
     told = hashlib.sha256()
     for pair in pairs:
-        told.update(f"{pair.name}\0{pair.problem}\0{pair.b.index}\0{pair.a.index}\n".encode())
+        facts: list[Any] = [pair.name, pair.problem]
+        for picture, mask in ((pair.b, pair.mask_b), (pair.a, pair.mask_a)):
+            facts += [picture.index, picture.half, picture.padding, bool(mask)]
+        told.update(json.dumps(facts).encode())
     return told.hexdigest()
 
 
@@ -174,5 +180,10 @@ def _frames(video: Path, how: SourceReading) -> Iterator[SourcePair]:
 
 
 def _safe(name: str) -> str:
-    """Fit for a file's name everywhere."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:80] or "pair"
+    """Fit for a file's name everywhere; if more than spaces is lost, with a hash of the whole."""
+    whole = unicodedata.normalize("NFC", name)
+    kept = re.sub(r"[^\w-]+", "-", whole).encode()[:NAMED].decode(errors="ignore")
+    if kept and kept == whole.replace(" ", "-"):
+        return kept
+    digest = hashlib.sha256(whole.encode(errors="surrogatepass")).hexdigest()
+    return f"{kept}-{digest[:8]}"

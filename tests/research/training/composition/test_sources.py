@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import cv2
 import numpy as np
@@ -123,6 +123,56 @@ def test_folders_of_pairs_with_masks(tmp_path):
     both = find_pairs(tmp_path)
     assert len(both) == 6 and both[1].mask_b == mug.mask_a and both[1].name == "mug-back"
     assert pair_from(json.loads(json.dumps(asdict(mug)))) == mug
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("кружка", "чашка", "чаш ка"), ("茶" * 60, "茶" * 60 + "碗"), ("मग", "मेग", "मिग"),
+        ("!", "?", "🏺"), ("mug" * 40, "mug" * 40 + "s"), ("mug (1)", "mug [1]", "mug 1"),
+    ],
+)  # fmt: skip
+def test_pairs_have_names_of_their_own_that_any_disk_takes(tmp_path, names):
+    for where in (tmp_path / "pairs", tmp_path / "pairs" / ("täglich " * 20)):
+        for name in names:
+            write(where / f"{name}-a.png", two_halves()[1])
+            write(where / f"{name}-b.png", two_halves()[2])
+    found = find_pairs(tmp_path / "pairs")
+    assert len(found) == 4 * len(names)
+    for pair in found:
+        assert not set(pair.name) & set('/\\?*:<>|" ')
+        write(tmp_path / "out" / f".{pair.name}.coarse.png.12345678.unfinished", two_halves()[1])
+    assert len(list((tmp_path / "out").iterdir())) == len(found)
+
+
+def test_a_name_of_letters_in_any_script_is_kept(tmp_path):
+    for name in ("кружка", "mug 1", "Krüge", "茶碗_2"):
+        for side in "ab":
+            write(tmp_path / f"{name}-{side}.png", two_halves()[1])
+    names = {pair.name for pair in find_pairs(tmp_path, ONE_WAY)}
+    assert names == {"кружка", "mug-1", "Krüge", "茶碗_2"}
+
+
+def test_pairs_that_are_read_in_another_way_are_others(tmp_path):
+    """A folder of triplets is gone on with by the same pairs only, wherever their pictures lie."""
+    for home in ("one", "two"):
+        write(tmp_path / home / "0.png", two_halves()[0])
+        row = {"file_name": "0.png", "quality_assessment": GOOD}
+        (tmp_path / home / "metadata.jsonl").write_text(json.dumps(row))
+        for side in "ab":
+            write(tmp_path / f"{home}-files" / f"mug-{side}.png", two_halves()[1])
+    halves, files = tmp_path / "one", tmp_path / "one-files"
+    narrow = SourceReading(both_ways=False, padding=0.01)
+    found = [find_pairs(halves, how) for how in (ONE_WAY, narrow, SourceReading())]
+    found.append(tuple(pair.turned_round for pair in found[0]))
+    found.append(tuple(replace(pair, a=pair.b, b=pair.a) for pair in found[0]))
+    found.append(find_pairs(files, ONE_WAY))
+    for side in "ab":
+        (files / f"mug-{side}.mask.png").write_bytes(shapes.mask_png(shapes.mask("disc")))
+        found.append(find_pairs(files, ONE_WAY))
+    assert len({fingerprint(pairs) for pairs in found}) == len(found)
+    assert fingerprint(find_pairs(tmp_path / "two", narrow)) == fingerprint(found[1])
+    assert fingerprint(find_pairs(tmp_path / "two-files", ONE_WAY)) == fingerprint(found[5])
 
 
 def test_frames_of_a_video(tmp_path):
