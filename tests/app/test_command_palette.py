@@ -92,6 +92,8 @@ def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Ed
         ("heal", "Background alone"), ("drop shadow", "Shadow"), ("deselect", "Clear selection"),
         ("hotkeys", "Keyboard and pointer…"), ("hue", "Saturation"), ("flip", "Symmetry"),
         ("hide", "Hide object"), ("take away", "Hide object"), ("animation", "Add key pose"),
+        ("remove object", "Take out of the photo"), ("delete", "Take out of the photo"),
+        ("erase", "Take out of the photo"), ("discard", "Put back into the photo"),
     ):  # fmt: skip
         palette._typed = typed
         assert title in [entry.title for entry in palette._found(editor)][:3], typed

@@ -29,7 +29,8 @@ ELSEWHERE = {  # not about an edit
 CHANGING = {  # commands of which a change is known: nobody may forget to look
     "grow", "shrink", "smooth", "feather", "remove_handle", "reset_handle",
     "reset_handles", "reset_pose", "reset_place", "reset_position", "reset_turn", "reset_size",
-    "ground", "duplicate", "remove_object", "forward", "shadow", "decontaminate", "to_front",
+    "ground", "duplicate", "remove_object", "take_out", "forward", "shadow", "decontaminate",
+    "to_front",
 }  # fmt: skip
 ALIKE = {"shrink", "smooth", "feather"}  # as "grow": a shape that follows the mask takes seconds
 

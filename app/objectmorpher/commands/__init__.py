@@ -85,7 +85,7 @@ OTHER_WORDS = {
     "Redo": "repeat",
     "Refine": "ai harmonize enhance",
     "Refine mask": "brush paint selection",
-    "Remove object": "delete erase",
+    "Put back into the photo": "discard object revert original restore",
     "Reset pose": "revert original",
     "Roll": "rotate spin",
     "Rotation ring": "rotate turn",
@@ -103,6 +103,7 @@ OTHER_WORDS = {
     "Strength": "drop shadow",
     "Symmetry": "mirror flip",
     "Text size": "font zoom interface scale dpi",
+    "Take out of the photo": "remove object delete erase take away",
     "Theme": "dark mode light mode colours appearance",
     "Undo": "back revert",
     "Tutorial and how-to…": "help manual documentation",
@@ -111,8 +112,8 @@ OTHER_WORDS = {
 }  # fmt: skip
 
 __all__ = [
-    "COMMANDS", "GROUPS", "OTHER_WORDS", "Command", "hint_of", "keys_of", "next_step", "run",
-    "take_next_step", "why_not",
+    "COMMANDS", "GROUPS", "OTHER_WORDS", "Command", "hint_of", "keys_of", "label_of",
+    "next_step", "run", "take_next_step", "why_not",
 ]  # fmt: skip
 
 GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
@@ -151,10 +152,16 @@ def keys_of(editor: Editor, name: str) -> str:
     return editor.settings.shortcuts.get(name, COMMANDS[name].keys)
 
 
+def label_of(editor: Editor, name: str) -> str:
+    """What a command is called; of the current object, where that makes a difference."""
+    is_removing = name == "remove_object" and editor.object is not None
+    return editor.objects.removing if is_removing else t(COMMANDS[name].label)
+
+
 def hint_of(editor: Editor, name: str) -> str:
     """What a command is called, and the keys that run it."""
     keys = keys_of(editor, name)
-    return t(COMMANDS[name].label) + (f" ({keys})" if keys else "")
+    return label_of(editor, name) + (f" ({keys})" if keys else "")
 
 
 def take_next_step(editor: Editor) -> None:

@@ -65,8 +65,9 @@ COMMANDS: dict[str, Command] = {
         no_lift,
         lambda e: e.object is not None and not e.object.is_visible,
     ),
+    "take_out": Command("Take out of the photo", "", lambda e: e.objects.take_out(), no_sight),
     "remove_object": Command(
-        "Remove object", "Shift+Delete", lambda e: e.objects.remove(), no_selection
+        "Put back into the photo", "Shift+Delete", lambda e: e.objects.remove(), no_selection
     ),
     "lock": Command(
         "Lock object",

@@ -129,7 +129,7 @@ class Editor(EditorState):
             self._forget_derived()
         self.derived.adopt(shapes)
         self.tab.history = History(document, limit=self.settings.history_mb << 20)
-        self.tab.exported = frozenset()
+        self.tab.exported, self.tab.asked = frozenset(), None
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
         self.view.split, self.view.shown = None, Shown.COMPOSITE

@@ -163,6 +163,7 @@ class Tab:
     looked: dict[str, Any] = field(default_factory=dict)  # OWN_VIEW, as the tab was left
     composed: dict[str, Any] = field(default_factory=dict)  # OWN_COMPOSE, likewise
     exported: frozenset[What] = frozenset()  # what of it was exported
+    asked: Mask | None = None  # (H, W) px of pieces that were offered as parts of an object
     writing: Step | None = None  # which a session's file is to hold, that is not written yet
     autosave: Autosave = field(init=False)
 

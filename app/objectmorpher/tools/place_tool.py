@@ -333,7 +333,10 @@ def _hints() -> dict[str, str]:
     ring = t("Drag along the ring to turn the object · Shift turns in steps of 15°")
     return {
         OTHER: t("Click chooses this object · Drag moves it"),
-        "move": t("Drag moves the object · Ctrl-drag turns it · Wheel: depth · Shift: one axis"),
+        "move": t(
+            "Drag moves the object · Ctrl-drag turns it · Wheel while dragging: depth"
+            " · Shift: one axis"
+        ),
         "depth": t("Drag the arrow to bring the object nearer or farther"),
         "scale": t("Drag a corner to scale the object · Shift scales in steps of 10 %"),
         "yaw": ring, "pitch": ring, "roll": ring,

@@ -559,8 +559,7 @@ def erased_by(
     found = []
     for owner in sorted({g.owner for g in gone}):
         pieces = [(g, _unlike_fill(g, document)) for g in gone if g.owner == owner]
-        like = [(g, own) for g, own in pieces if g in parts and own.sum() >= least]
-        like = [(g, own) for g, own in like if _is_like_owner(g, own, document)]
+        like = [(g, own) for g, own in pieces if g in parts and is_like_owner(g, document, margin)]
         px, like_px = (sum(int(own.sum()) for _, own in some) for some in (pieces, like))
         if px >= least:
             place = _inmost(max(like or pieces, key=lambda piece: piece[1].sum()), document)
@@ -568,11 +567,12 @@ def erased_by(
     return tuple(found)
 
 
-def _is_like_owner(ghost: Ghost, own: Mask, document: Document) -> bool:
-    """Whether what shows it, `own` (h, w) of its box, has colours of its object's own."""
+def is_like_owner(ghost: Ghost, document: Document, margin: float) -> bool:
+    """Whether enough shows it, and has colours of its object's own; `margin` as in `left_out`."""
+    own = _unlike_fill(ghost, document)
     photo, plate = document.photo.pixels, document.plate
     mask = document.objects[ghost.owner].mask
-    if mask is None or plate is None:
+    if mask is None or plate is None or own.sum() < (LEAST_PART * margin) ** 2:
         return False
     seen = _colors(photo[_in_photo(ghost, document)], own)
     to_own, to_fill = (

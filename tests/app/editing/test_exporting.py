@@ -163,6 +163,37 @@ def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
     assert moved.message is not None and moved.message.is_error
 
 
+def test_a_video_is_a_film_until_pictures_are_wanted(moved: Editor, tmp_path: Path) -> None:
+    """Also of a PNG file, and after one was written; each of both remembers its own format."""
+    exporting = moved.exporting
+
+    def begun() -> Format:
+        exporting.open()
+        exporting.choose_what(What.VIDEO)
+        assert exporting.draft is not None and not exporting.has_bits
+        return exporting.draft.format
+
+    assert moved.source == tmp_path / "ball.png"
+    assert begun() is FORMATS[What.VIDEO][0] and not exporting.is_folder
+    export(moved, What.PHOTO, Format.PNG)
+    export(moved, What.PHOTO, Format.WEBP)
+    assert begun() is FORMATS[What.VIDEO][0]
+    exporting.choose_what(What.PHOTO)
+    exporting.choose_what(What.VIDEO)
+    for chosen in (Format.PNG, Format.GIF):
+        exporting.choose_format(chosen)
+        exporting.choose_seconds(1.0)
+        assert exporting.is_folder == (chosen is Format.PNG) and not exporting.has_bits
+        exporting.confirm()
+        assert begun() is chosen
+    exporting.choose_what(What.PHOTO)
+    exporting.close()
+    exporting.open()
+    assert exporting.draft is not None and exporting.draft.format is Format.WEBP
+    exporting.close()
+    wait_for_jobs(moved)
+
+
 def film(editor: Editor, folder: Path) -> Path:
     """A film that is being written."""
     editor.settings = replace(editor.settings, export_folder=str(folder))
@@ -289,7 +320,7 @@ def test_name_and_format_follow_each_other(moved: Editor, tmp_path: Path) -> Non
     assert exporting.path.name == "ball-mask.png"
     exporting.set_name("my ball, 1.5")
     for what, name in (
-        (What.PHOTO, "my ball, 1.5.png"), (What.VIDEO, "my ball, 1.5"),
+        (What.PHOTO, "my ball, 1.5.png"), (What.VIDEO, "my ball, 1.5.webm"),
         (What.CUTOUT, "my ball, 1.5.png"),
     ):  # fmt: skip
         exporting.choose_what(what)

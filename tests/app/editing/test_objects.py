@@ -10,9 +10,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from editor_steps import CENTRE, HEIGHT, WIDTH, close_all, duplicate, wait_for_jobs, wait_until
+from editor_steps import (
+    CENTRE,
+    HEIGHT,
+    WIDTH,
+    close_all,
+    duplicate,
+    not_lifted,
+    wait_for_jobs,
+    wait_until,
+)
 from objectmorpher.canvas.frame import build_frame, drawn_order
-from objectmorpher.commands import COMMANDS, run, why_not
+from objectmorpher.commands import COMMANDS, label_of, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
@@ -141,6 +150,29 @@ def test_hiding_takes_it_out_of_the_picture_by_a_command_too(
     assert COMMANDS["hide"].is_on is not None and COMMANDS["hide"].is_on(editor)
     run(editor, "hide")
     assert editor.object is not None and editor.object.is_visible
+
+
+def test_taking_out_shows_the_background_and_putting_back_the_photo(
+    copied: Editor, ball: Document
+) -> None:
+    assert label_of(copied, "remove_object") == "Discard object", "a copy is in no photo"
+    run(copied, "remove_object")
+    assert copied.history is not None and copied.history.undo_label == "Discard object"
+    copied.start(edits.set_placement(ball, 0, Placement(move=(9.0, 0.0))))
+    before = copied.document
+    assert label_of(copied, "remove_object") == "Put back into the photo"
+    run(copied, "take_out")
+    assert copied.object is not None and not copied.object.is_visible
+    assert copied.message is not None and copied.message.action is not None
+    assert why_not(copied, "take_out") == f"{copied.object.name} is hidden"
+    assert copied.history is not None and copied.history.undo_label == "Take out of the photo"
+    copied.message.action.run()
+    assert copied.object.is_visible and copied.message is None
+    run(copied, "undo")
+    run(copied, "undo")
+    assert copied.document is before
+    copied.start(not_lifted(ball))
+    assert why_not(copied, "take_out") is not None, "nothing is behind it yet"
 
 
 def test_removing_the_last_object_gives_the_photo_back(editor: Editor, ball: Document) -> None:
@@ -368,14 +400,51 @@ def test_what_has_left_its_place_cannot_be_pointed_at_there(editor: Editor, ball
     assert editor.landing.left_at(np.array(at)) is None, "it is there again"
 
 
-def test_what_is_offered_is_outlined_where_its_object_would_show_it(
-    editor: Editor, ball: Document
-) -> None:
-    editor.start(ball)
+def with_a_piece(ball: Document, is_like: bool) -> Document:
+    """Its background has filled in a corner, too, which has the ball's colours or the wall's."""
     assert ball.plate is not None
     hole, pixels = ball.plate.hole.copy(), ball.plate.pixels.copy()
     hole[2:14, 2:14], pixels[2:14, 2:14] = True, 255
-    editor.apply("Fill", edits.set_plate(ball, replace(ball.plate, hole=hole, pixels=pixels)))
+    seen = ball.photo.picture.pixels.copy()
+    if is_like:
+        top, left = ball.plate.top, ball.plate.left
+        seen[top + 2 : top + 14, left + 2 : left + 14] = seen[66:78, 84:96]
+    photo = replace(ball.photo, picture=replace(ball.photo.picture, pixels=seen))
+    plate = replace(ball.plate, hole=hole, pixels=pixels)
+    return replace(ball, photo=photo, plate=plate)
+
+
+def test_only_what_has_an_objects_colours_is_offered_and_only_once(
+    editor: Editor, ball: Document
+) -> None:
+    for is_like in (False, True):
+        piece = with_a_piece(ball, is_like)
+        assert piece.plate is not None
+        editor.start(replace(piece, plate=None))
+        editor.apply("Fill", piece)
+        editor.poll()
+        assert (len(editor.leaving_out.outlines) == 1) is is_like
+        assert (why_not(editor, "add_left_out") is None) is is_like
+    editor.view.tool, editor.view.compose.is_bare = ToolName.COMPOSE, True
+    assert editor.leaving_out.outlines == (), "there it is not seen"
+    editor.view.compose.is_bare = False
+    assert len(editor.leaving_out.outlines) == 1
+    editor.message = None  # dismissed
+    assert piece.plate is not None
+    pixels = piece.plate.pixels.copy()
+    pixels[60:70, 60:70] = 90  # a repair
+    editor.apply("Repair", replace(piece, plate=replace(piece.plate, pixels=pixels)))
+    editor.poll()
+    assert editor.leaving_out.outlines == () and why_not(editor, "add_left_out") is None
+
+
+def test_what_is_offered_is_outlined_where_its_object_would_show_it(
+    editor: Editor, ball: Document
+) -> None:
+    ball = with_a_piece(ball, is_like=True)
+    assert ball.plate is not None
+    editor.start(replace(ball, plate=None))
+    editor.apply("Fill", ball)
     editor.poll()
     outlines = editor.leaving_out.outlines
     assert len(outlines) == 1, editor.message

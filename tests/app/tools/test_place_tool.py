@@ -10,6 +10,7 @@ import pytest
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
+from objectmorpher.gui.panels.place import DONE, place_by, placed_values
 from objectmorpher.tools.gizmo import TURNS, ghost, gizmo
 from objectmorpher.tools.place_tool import SLOW, PlaceTool
 from objectmorpher.tools.pointer import Pointer, PointerShape
@@ -314,6 +315,23 @@ def test_it_stays_on_the_ground_whatever_is_done(grounded: Editor, part: str) ->
         stroke(grounded, shown.arrow.at(shown.arrow.far + 20), shown.arrow.at(shown.arrow.far))
     assert grounded.placing.placement != Placement()
     assert abs(below_ground(grounded)) < EXACT
+
+
+@pytest.mark.parametrize("name", ["Right", "Down", "Farther", "Yaw", "Pitch", "Roll", "Scale"])
+def test_whatever_number_is_typed_it_stays_on_the_ground(grounded: Editor, name: str) -> None:
+    """And the number is then the one that was typed."""
+    assert grounded.placing.placement is not None
+    numbers = list(DONE)
+    for typed in (0.8, 9.0, -0.4) if name == "Farther" else (-6.0, 12.0, 30.0):
+        typed = 100 + typed if name == "Scale" else typed
+        place_by(grounded, name, typed)
+        assert grounded.placing.placement is not None
+        assert abs(below_ground(grounded)) < EXACT, typed
+        values = placed_values(grounded, grounded.placing.placement)
+        assert values[numbers.index(name)] == pytest.approx(typed, abs=1e-3)
+    grounded.commit(DONE[name])
+    run(grounded, "undo")
+    assert grounded.placing.placement == Placement()
 
 
 @pytest.mark.parametrize("command", ["reset_turn", "reset_size"])

@@ -127,7 +127,7 @@ class Exporting:
         """It has its usual name, unless another one was typed."""
         draft = self._draft
         is_usual = draft.name.strip() in ("", self._named(draft).name)
-        changed = self._fitting(replace(draft, what=what))
+        changed = self._fitting(self._filmed(replace(draft, what=what)))
         self._change(self._named(changed) if is_usual else _ended(changed))
 
     def choose_format(self, format: Format) -> None:
@@ -196,7 +196,8 @@ class Exporting:
     @property
     def has_bits(self) -> bool:
         """Whether there is a choice of bit depth."""
-        return self._draft.format.has_16_bits and self._draft.what not in (What.MASK, What.DEPTH)
+        has_none = (What.MASK, What.DEPTH, What.VIDEO)
+        return self._draft.format.has_16_bits and self._draft.what not in has_none
 
     @property
     def has_quality(self) -> bool:
@@ -373,6 +374,13 @@ class Exporting:
         usual = own if own in known else known[0]
         return draft if draft.format in known else replace(draft, format=usual)
 
+    def _filmed(self, draft: Draft) -> Draft:
+        """A video has the format of the last one, and never the photo's: pictures in a folder."""
+        if draft.what is not What.VIDEO or self._draft.what is What.VIDEO:
+            return draft
+        known, last = FORMATS[What.VIDEO], self._editor.settings.export_film
+        return replace(draft, format=next((f for f in known if f.value == last), known[0]))
+
     @property
     def own_format(self) -> Format:
         """The photo's own, where it can be written: a JPEG file becomes a JPEG file."""
@@ -420,11 +428,13 @@ class Exporting:
         editor = self._editor
         format = "" if draft.format is self.own_format else draft.format.value
         proposed = self._fitting(replace(draft, format=self._usual_format)).format
-        if draft.what is not What.PHOTO and draft.format is proposed:  # nobody chose it
-            format = editor.settings.export_format
+        is_film = draft.what is What.VIDEO
+        if is_film or (draft.what is not What.PHOTO and draft.format is proposed):
+            format = editor.settings.export_format  # nobody chose another
+        film = draft.format.value if is_film else editor.settings.export_film
         editor.tab.exported |= {draft.what}
         editor.settings = replace(
-            editor.settings, export_format=format, export_bits=draft.bits,
+            editor.settings, export_format=format, export_film=film, export_bits=draft.bits,
             quality=draft.quality, webp_quality=draft.webp_quality,
             export_motion=draft.motion.value, export_seconds=draft.seconds,
             export_folder=str(path.parent.absolute()),

@@ -101,6 +101,15 @@ class Objects:
             if editor.message is self._hidden:
                 editor.message = None
 
+    def take_out(self) -> None:
+        """The current object is gone from the picture, and what is behind it shows."""
+        editor, k = self._editor, self._editor.current
+        document = editor.committed
+        if document is None or not editor.is_lifted or editor.hand.is_busy:
+            return
+        editor.apply(t("Take out of the photo"), edits.set_visible(document, k, False))
+        self.say_hidden(k)
+
     def say_hidden(self, k: int) -> None:
         """That object `k` is hidden, with a button that shows it."""
         name = self._editor.opened.objects[k].name
@@ -145,13 +154,28 @@ class Objects:
                 t("{name} lies exactly over the original · Drag it away", name=twin.name)
             )
 
+    @property
+    def _is_in_photo(self) -> bool:
+        """Whether the photo shows the current object where it is edited no more: it is neither
+        another photo's nor a copy."""
+        item, k = self._editor.object, self._editor.current
+        if item is None:
+            return True
+        others = (o for i, o in enumerate(self._editor.opened.objects) if i != k)
+        return not item.is_visitor and all(o.mask is not item.mask for o in others)
+
+    @property
+    def removing(self) -> str:
+        """What removing the current object is called."""
+        return t("Put back into the photo") if self._is_in_photo else t("Discard object")
+
     def remove(self) -> None:
         """The current object is not edited any more: the photo shows it as it was."""
         editor = self._editor
         document = editor.committed
         if document is None or editor.object is None or editor.hand.is_busy:
             return
-        name, k, item = editor.object.name, editor.current, editor.object
+        name, k, is_in_photo = editor.object.name, editor.current, self._is_in_photo
         if editor.object.is_locked:
             editor.say_locked(k)
             return
@@ -159,9 +183,8 @@ class Objects:
         for job in (SELECT, LIFT, READ_MASK):
             editor.jobs.cancel(job)
         left = edits.remove_object(document, k)
-        editor.apply(t("Remove object"), left)
+        editor.apply(self.removing, left)
         self.choose(max(min(k, len(left.objects) - 1), 0))
-        is_in_photo = not item.is_visitor and all(o.mask is not item.mask for o in left.objects)
         if is_in_photo:
             editor.say(t("{name} is as it was in the photo · Ctrl+Z undoes that", name=name))
         else:

@@ -34,6 +34,11 @@ if TYPE_CHECKING:
     from .posing import Posing
 
 
+# x the camera's height above the ground, of the camera above an object's middle: with less, the
+# foot slides by more than four times as many px as the middle.
+LEAST_HEIGHT = 0.25
+
+
 class Placing:
     """The current object's placement."""
 
@@ -149,6 +154,23 @@ class Placing:
             self.move_to(replace(placement, depth=depth))
         else:
             self.move_to(self.hold().moved(np.zeros(2), depth - placement.depth))
+
+    def move_down(self, down: float) -> None:
+        """Previews the object with its middle so many image px below where it was in the photo; on
+        the ground it slides there, and the middle is where the ground lets it be."""
+        placement, ground = self.placement, self.ground
+        if placement is None:
+            return
+        delta = np.array([0.0, down - placement.move[1]])
+        if ground is None:
+            self.move_to(replace(placement, move=(placement.move[0], down)))
+            return
+        # The middle slides on a plane of its own, unless that is seen too much from its side.
+        held, centre = self.hold(), self.centre()
+        height = float(centre @ ground.normal)
+        if height >= LEAST_HEIGHT * ground.height:
+            held = replace(held, point=centre, ground=Ground(ground.normal, height))
+        self.move_to(held.moved(delta))
 
     # The ground
 

@@ -15,7 +15,7 @@ from objectmorpher_core.segment import Found, mask_edit
 
 from ...system.texts import t
 from ..tasks import SELECT, Combine, Question
-from ..view import Action
+from ..view import Action, ToolName
 from .masking import loses_work
 
 if TYPE_CHECKING:
@@ -336,6 +336,9 @@ class LeavingOut:
             return ()
         if document is None or document.plate is None:
             return ()
+        view = self._editor.view
+        if view.tool is ToolName.COMPOSE and view.compose.is_bare:  # where no object is seen
+            return ()
         corner = np.array([document.plate.left, document.plate.top], np.float32)
         derived, editor = self._editor.derived, self._editor
         outlines = tuple(
@@ -364,15 +367,34 @@ class LeavingOut:
 
         Of many pieces most are no part of it: what lies behind spokes or leaves.
         """
-        count = len(self.pieces)
+        pieces, asked = self._not_asked()
+        count = len(pieces)
         if not 0 < count <= MOST_OFFERED or self._editor.object is None:
             return
+        self._editor.tab.asked = asked
         self._offered = Action(t("Add it") if count == 1 else t("Add them"), self.add)
         name = self._editor.object.name
         question = t("Is the outlined piece a part of {name}?", name=name)
         if count > 1:
             question = t("Are the outlined pieces parts of {name}?", name=name)
         self._editor.say(question, self._offered)
+
+    def _not_asked(self) -> tuple[tuple[Ghost, ...], Mask]:
+        """The pieces of which most was in no earlier question in this tab; and (H, W) the px of
+        those and of these."""
+        document, asked = self._editor.opened, self._editor.tab.asked
+        size = document.photo.pixels.shape[:2]
+        known = np.zeros(size, bool) if asked is None or asked.shape != size else asked
+        both, new = known.copy(), []
+        for piece in self.pieces:
+            assert document.plate is not None, "pieces are of a plate"
+            x0, y0, x1, y1 = piece.box
+            top, left = document.plate.top, document.plate.left
+            place = slice(top + y0, top + y1), slice(left + x0, left + x1)
+            if known[place][piece.there].mean() < 0.5:
+                new.append(piece)
+                both[place] |= piece.there
+        return tuple(new), both
 
     def add(self) -> None:
         """The pieces belong to the object: its outline takes them in, and its shape follows."""
@@ -391,10 +413,12 @@ class LeavingOut:
 
     def _all(self, document: Document) -> tuple[Ghost, ...]:
         from objectmorpher_core.compose.plate.plate import hole_margin
-        from objectmorpher_core.compose.plate.residue import left_out
+        from objectmorpher_core.compose.plate.residue import is_like_owner, left_out
 
         if self._found[0] is not document.plate:
             margin = hole_margin(*document.photo.size)
             ghosts = self._editor.derived.ghosts(document)
-            self._found = document.plate, left_out(document, ghosts, margin)
+            parts = left_out(document, ghosts, margin)
+            like = tuple(g for g in parts if is_like_owner(g, document, margin))
+            self._found = document.plate, like
         return self._found[1]

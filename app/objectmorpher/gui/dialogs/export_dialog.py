@@ -69,7 +69,10 @@ def _draw_what(exporting: Exporting) -> None:
     if (chosen := unfolding("what", choices, exporting.draft.what)) is not exporting.draft.what:
         exporting.choose_what(chosen)
     imgui.set_cursor_pos_x(_field())
-    note(t(ABOUT[exporting.draft.what]))
+    if exporting.draft.what is What.VIDEO and exporting.is_folder:
+        note(t("A folder of pictures, one for each frame, at most 1280 px wide."))
+    else:
+        note(t(ABOUT[exporting.draft.what]))
     imgui.dummy(theme.size(0, 0))
 
 
@@ -77,14 +80,14 @@ def _draw_how(exporting: Exporting) -> None:
     assert exporting.draft is not None
     _name(t("Format"))
     _draw_format(exporting)
-    if exporting.has_bits:
+    if exporting.draft.what is What.VIDEO:
+        _draw_motion(exporting)
+    elif exporting.has_bits:
         _name(t("Depth"))
         depths = tuple(Segment(bits, t("{bits} bit", bits=bits)) for bits in DEPTHS)
         bits = segmented("bits", depths, exporting.bits)
         if bits != exporting.bits:
             exporting.choose_bits(0 if bits == exporting.own_bits else bits)
-    elif exporting.draft.what is What.VIDEO:
-        _draw_motion(exporting)
     elif exporting.has_quality:
         _name(t("Quality"))
         imgui.set_next_item_width(FILL)

@@ -77,8 +77,8 @@ def draw_place(editor: Editor) -> None:
         for number in group.numbers:
             shown = replace(number, name=t(number.name), format=t(number.format))
             change = number_field(shown, values[number.name])
-            values[number.name] = change.value
-            take(editor, change, partial(_change, editor, group, values), t(DONE[number.name]))
+            preview = partial(place_by, editor, number.name, change.value)
+            take(editor, change, preview, t(DONE[number.name]))
         if group.title == "Position":
             _draw_depth(editor, placement)
         if group.title == "Turn":
@@ -155,18 +155,22 @@ def _draw_seen_from(editor: Editor) -> None:
     take(editor, change, lambda: editor.placing.look_down(wanted), t("Set what is upright"))
 
 
-def _change(editor: Editor, group: Group, values: dict[str, float]) -> None:
-    """Numbers of the position count as they are; what is turned or scaled stays on the ground."""
-    placing, was, home = editor.placing, editor.placing.placement, editor.placing.home
+def place_by(editor: Editor, name: str, value: float) -> None:
+    """Previews the object with another value of one number; on the ground it stays there."""
+    placing, was = editor.placing, editor.placing.placement
     assert was is not None, "its numbers are shown"
-    right, down, away, yaw, pitch, roll, scale = (values[name] for name in _names())
-    moved = right + home.move[0], down + home.move[1]
-    placement = replace(was, move=moved, depth=away + home.depth)
-    if (yaw, pitch, roll) != placing.angles:
-        placement = placing.turned_to(placement, (yaw, pitch, roll))
-    elif group.title == "Size":
-        placement = placing.scaled(placement, scale / 100 * home.scale)
-    placing.move_to(placement)
+    home = placing.home
+    if name == "Farther":
+        placing.move_away(value + home.depth)
+    elif name == "Right":
+        placing.move_to(placing.stood(replace(was, move=(value + home.move[0], was.move[1]))))
+    elif name == "Down":
+        placing.move_down(value + home.move[1])
+    elif name == "Scale":
+        placing.move_to(placing.scaled(was, value / 100 * home.scale))
+    else:
+        angles = dict(zip(("Yaw", "Pitch", "Roll"), placing.angles, strict=True)) | {name: value}
+        placing.move_to(placing.turned_to(was, (angles["Yaw"], angles["Pitch"], angles["Roll"])))
 
 
 def _names() -> list[str]:

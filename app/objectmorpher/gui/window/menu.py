@@ -6,7 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import COMMANDS, hint_of, keys_of, run
+from ...commands import COMMANDS, hint_of, keys_of, label_of, run
 from ...editor.editor import Editor
 from ...editor.view import Shown, ToolName
 from ...system.texts import t
@@ -79,7 +79,7 @@ MENUS: dict[str, tuple[str, ...]] = {
     ),
     "Object": (
         "lift", "add_photo", "import_shape", "fit_again", "-", "rename", "duplicate", "lock",
-        "hide", "remove_object", "-",
+        "hide", "take_out", "remove_object", "-",
         "keep_in_front", "forward", "backward", "to_front", "to_back", "-", "ground", "-",
         "paint", "unpaint", "-", "bare", "take_from", "forget_sources", "fill_again", "shadow",
         "take_shadow", "depth",
@@ -138,7 +138,7 @@ def _draw_items(editor: Editor, names: tuple[str, ...]) -> None:
 def _draw_command(editor: Editor, name: str) -> None:
     command = COMMANDS[name]
     reason = command.why_not(editor)
-    label = t(command.label)
+    label = label_of(editor, name)
     if name == "undo" and editor.undo_label:
         label = t("Undo: {label}", label=editor.undo_label)
     if name == "redo" and editor.history and editor.history.redo_label:
