@@ -110,7 +110,7 @@ class Rules(NamedTuple):
     look_aside: float = 0.4  # = streak_start: nothing of the photo has faded before
     # Of a soft matte's fringe it does so sooner: turned away from the outline, hair that the
     # background shines through would be a line of it. `Sides.zoom` is negative there.
-    fringe_aside: float = 0.8
+    fringe_aside: float = 0.7
 
     # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below streak_start
     # the photo's pixels begin to show as streaks, below streak_end they are not used.
