@@ -375,7 +375,10 @@ def _middle(points: np.ndarray) -> np.ndarray:
 
 
 def _leans_out(points: np.ndarray, lowest: np.ndarray, foot: F64, down: np.ndarray) -> bool:
-    """Whether the mean of the points (N, 3) is far beyond the `lowest` (n, 3), about the foot."""
+    """Whether the mean of the points (N, 3) of what is shallow is far beyond the `lowest` (n, 3).
+
+    `foot` (3,) is amid these.
+    """
     to_mean = points.mean(0) - foot
     height = float(-to_mean @ down)
     aside = to_mean + height * down
