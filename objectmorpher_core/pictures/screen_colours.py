@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from PIL import Image, ImageCms
@@ -40,6 +41,21 @@ def screen_table(
     table = np.asarray(shown).reshape(values.shape)
     is_same = np.abs(table.astype(np.int16) - values).max() <= UNSEEN
     return None if is_same else table
+
+
+def in_srgb(frames: Iterable[U8], photo: bytes | None) -> Iterator[U8]:
+    """Frames (h, w, 3 or 4) of a photo's colours, by its ICC profile, in those of sRGB.
+
+    Where that changes nothing that is seen they stay as they are. Alpha always does.
+    """
+    if photo is None or screen_table(photo, None) is None:
+        yield from frames
+        return
+    one, other = _profile(photo), _profile(None)
+    for frame in frames:
+        colours = np.ascontiguousarray(frame[..., :3])
+        turned = np.asarray(_converted(Image.fromarray(colours), one, other, "RGB"))
+        yield np.dstack([turned, frame[..., 3:]])
 
 
 def _shown(

@@ -69,11 +69,14 @@ def _opened(path: Path) -> cv2.VideoCapture:
     return video
 
 
-def encode_video(frames: Iterable[U8], rate: float, ending: str) -> bytes:
+def encode_video(
+    frames: Iterable[U8], rate: float, ending: str, further: Iterable[U8] = ()
+) -> bytes:
     """The file of `frames` (h, w, 3 or 4), all of one size, shown `rate` a second, for ever.
 
-    Of their alpha WebP keeps all, GIF whether a pixel is there; films have none, and an even
-    number of rows and columns: the last one is left out.
+    A format of few colours has those of the first frame and of `further` pictures (h, w, 3), for
+    all, so that nothing flickers. Of their alpha WebP keeps all, GIF whether a pixel is there;
+    films have none, and an even number of rows and columns: the last one is left out.
 
     Raises VideoError for an unknown ending, no frames, and where the encoder is not there.
     """
@@ -87,7 +90,7 @@ def encode_video(frames: Iterable[U8], rate: float, ending: str) -> bytes:
     everything = chain([first], coming)
     if ending in CODECS:
         return _filmed(everything, first.shape, rate, ending)
-    return _pictured(everything, rate, ending, first.shape[2] == 4)
+    return _pictured(everything, rate, ending, first.shape[2] == 4, further)
 
 
 def _filmed(frames: Iterable[U8], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
@@ -122,7 +125,9 @@ def _frames_in(path: Path) -> int:
     return count
 
 
-def _pictured(frames: Iterable[U8], rate: float, ending: str, has_alpha: bool) -> bytes:
+def _pictured(
+    frames: Iterable[U8], rate: float, ending: str, has_alpha: bool, further: Iterable[U8]
+) -> bytes:
     out = io.BytesIO()
     if ending == ".webp":
         images: Iterator[Image.Image] = map(Image.fromarray, frames)
@@ -130,7 +135,7 @@ def _pictured(frames: Iterable[U8], rate: float, ending: str, has_alpha: bool) -
         first.save(out, "WEBP", save_all=True, append_images=images, loop=0,
                    duration=_lasting(rate, 1), quality=WEBP_QUALITY, method=2)  # fmt: skip
         return out.getvalue()
-    images = map(_palettes(has_alpha), frames)
+    images = map(_palettes(has_alpha, further), frames)
     first = next(images)
     clear = {"transparency": CLEAR, "disposal": 2} if has_alpha else {}
     first.save(
@@ -153,8 +158,8 @@ def _below_half(level: int) -> int:
     return 255 if level < 128 else 0
 
 
-def _palettes(has_alpha: bool) -> Callable[[U8], Image.Image]:
-    """Makes pictures of 256 colours, which are the first frame's for all: nothing flickers."""
+def _palettes(has_alpha: bool, further: Iterable[U8]) -> Callable[[U8], Image.Image]:
+    """Makes pictures of 256 colours, for all those of the first and of `further` ones."""
     palette: list[Image.Image] = []
     count = CLEAR if has_alpha else 256
 
@@ -166,10 +171,23 @@ def _palettes(has_alpha: bool) -> Callable[[U8], Image.Image]:
         else:
             is_clear, image = None, Image.fromarray(at_most(frame, GIF_LONGEST))
         if not palette:
-            palette.append(image.quantize(count, Image.Quantize.MEDIANCUT))
+            shown = [image, *(Image.fromarray(at_most(each, GIF_LONGEST)) for each in further)]
+            palette.append(_side_by_side(shown).quantize(count, Image.Quantize.MEDIANCUT))
         made = image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)
         if is_clear is not None:
             made.paste(CLEAR, mask=is_clear)
         return made
 
     return reduced
+
+
+def _side_by_side(images: list[Image.Image]) -> Image.Image:
+    width, height = sum(image.width for image in images), max(image.height for image in images)
+    if len(images) == 1:
+        return images[0]
+    joined = Image.new("RGB", (width, height), images[0].getpixel((0, 0)))
+    left = 0
+    for image in images:
+        joined.paste(image, (left, 0))
+        left += image.width
+    return joined

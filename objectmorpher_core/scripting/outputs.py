@@ -16,11 +16,13 @@ from ..compose.composite import Composite, composite, object_texture, straight_c
 from ..compose.layers import Layer, layers
 from ..compose.plate.plate import overlap, plate_alpha, plate_picture
 from ..deform.puppet import Puppet, puppet_of
+from ..document.bounds import NORMAL
 from ..document.model import Document, EditObject
 from ..pictures.formats import NEED_PLATE, WRITTEN, Format, endings_of, format_of
 from ..pictures.image import LOSSLESS, Picture, encode_array, encode_picture, to_u8
 from ..pictures.openraster import encode_openraster
 from ..pictures.psd import encode_psd
+from ..pictures.screen_colours import in_srgb
 from ..pictures.video import encode_video
 from ..pipeline import Edited, export
 from ..raster import tiles
@@ -133,7 +135,10 @@ class Export:
             write = encode_psd if format_of(path.name) is Format.PSD else encode_openraster
             return write(pile, merged)
         if what == "video":
-            return encode_video(self._film(), self.clip.rate, path.suffix)
+            icc = self.document.photo.picture.icc
+            film = in_srgb(self._film(), icc)  # players know no other colours
+            edited = in_srgb(self._edited_frame(path.suffix), icc)
+            return encode_video(film, self.clip.rate, path.suffix, edited)
         if what in ("splats", "mesh"):
             return self._solid(what, path)
         return self._encoded(self.picture(what), path.suffix)
@@ -156,6 +161,11 @@ class Export:
     def _film(self) -> Iterator[U8]:
         return frames(self.document, self.clip, part(self.progress, 0.02, 0.95))
 
+    def _edited_frame(self, ending: str) -> Iterator[U8]:
+        """The edit as it is exported, for a format that has few colours; else nothing."""
+        if ending.lower() == ".gif":
+            yield to_u8(self.picture("photo").pixels)
+
     def files(self, what: str, folder: Path) -> dict[Path, bytes]:
         """Return the frames of a video, or the layers, as the PNG files in a folder.
 
@@ -167,12 +177,15 @@ class Export:
         if (old := _frames_beyond(folder, stem, self.clip.count)) is not None:
             raise ScriptError(f"{old} is of a longer video; choose another folder, or empty it")
         return {
-            folder / f"{stem}-{n:04d}.png": encode_array(frame)
+            folder / f"{stem}-{n:04d}.png": encode_array(frame, self.document.photo.picture.icc)
             for n, frame in enumerate(self._film())
         }
 
     def _layer_files(self, folder: Path) -> dict[Path, bytes]:
-        """As large as the photo, numbered from below, and all together."""
+        """As large as the photo, numbered from below, and all together.
+
+        A name ends with how the layer is mixed with those below, where that is not as usual.
+        """
         merged, pile = self.layers(part(self.progress, 0.05, 0.7))
         pile = [layer for layer in pile if layer.is_shown]
         height, width = merged.pixels.shape[:2]
@@ -185,7 +198,8 @@ class Export:
             if samples.shape[2] == 4:
                 samples = crop(samples, layer.box, (0, 0, width, height))
                 alpha = samples[..., 3]
-            name = re.sub(r"[^\w-]+", "-", layer.name).strip("-").lower() or "object"
+            said = layer.name if layer.mode == NORMAL else f"{layer.name} {layer.mode}"
+            name = re.sub(r"[^\w-]+", "-", said).strip("-").lower() or "object"
             data = encode_picture(Picture(samples[..., :3], alpha, icc=merged.icc), ".png")
             outputs[folder / f"{stem}-{k}-{name}.png"] = data
         outputs[folder / f"{stem}-{len(pile)}-composite.png"] = encode_picture(merged, ".png")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import io
 import os
 import struct
 from dataclasses import replace
@@ -11,15 +12,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import ImageCms
+from PIL import Image, ImageCms
 
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.settings import AS_THEY_ARE, AUTO, Settings
 from objectmorpher.system.desktop import read_profile, system_profile
-from objectmorpher_core.document.model import Document
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.pictures.screen_colours import GRID, profile_name, screen_table
+from objectmorpher_core.scripting.animation import Clip
+from objectmorpher_core.scripting.outputs import Export
+from tests.shapes import scene
 
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 REPLACE, BYTES = 0, 8
@@ -146,3 +151,29 @@ def test_a_proof_shows_what_another_device_can_show(
     run(editor, "proof")
     assert editor.message is not None and "not there any more" in editor.message.text
     assert not editor.view.is_proof
+
+
+def test_a_film_has_the_colours_of_srgb_and_its_frames_as_files_the_profile(tmp_path: Path) -> None:
+    own, document = dull(PROFILE), scene("ellipse").document()
+    photo = replace(document.photo, picture=replace(document.photo.picture, icc=own))
+    document = edits.set_placement(
+        replace(document, photo=photo), 0, Placement(move=(14.0, -6.0), turn=(20.0, 0, 0))
+    )
+    export = Export(document, clip=Clip(seconds=0.4, rate=10))
+    wanted = np.asarray(
+        ImageCms.profileToProfile(
+            Image.fromarray(photo.pixels),
+            ImageCms.ImageCmsProfile(io.BytesIO(own)),
+            ImageCms.ImageCmsProfile(io.BytesIO(PROFILE)),
+            ImageCms.Intent.RELATIVE_COLORIMETRIC,
+        )
+    ).astype(int)
+    data = export.encode("video", Path("film.webp"))
+    with Image.open(io.BytesIO(data)) as image:
+        found = np.asarray(image.convert("RGB"))
+    off = [np.abs(found - picture).mean() for picture in (wanted, photo.pixels.astype(int))]
+    assert off[0] < 0.7 * off[1], off
+    first = export.files("video", tmp_path)[tmp_path / f"{Path(photo.name).stem}-0000.png"]
+    with Image.open(io.BytesIO(first)) as image:
+        assert image.info["icc_profile"] == own
+        assert np.array_equal(np.asarray(image.convert("RGB")), photo.pixels)

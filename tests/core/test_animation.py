@@ -526,6 +526,16 @@ def test_a_clip_lasts_as_long_as_its_frames(ending: str, rate: float):
     assert lasting == pytest.approx(1000 * len(sent) / rate, abs=5)
 
 
+def test_a_gif_has_colours_that_its_first_frame_lacks():
+    grey = np.full((60, 80, 3), 128, np.uint8)
+    red = grey.copy()
+    red[20:40, 30:60] = (200, 60, 40)
+    data = encode_video(iter([grey, red, grey]), 10.0, ".gif", [red])
+    with Image.open(io.BytesIO(data)) as image:
+        for frame, before in zip(ImageSequence.Iterator(image), (grey, red, grey), strict=True):
+            assert difference(np.asarray(frame.convert("RGB")), before) < 2
+
+
 @pytest.mark.parametrize("ending", PICTURES)
 def test_what_the_photo_does_not_show_is_in_no_frame(ending: str):
     sent, clear = drifting(4), np.s_[:30, :40]

@@ -19,7 +19,7 @@ from objectmorpher.editor.settings import Settings
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.pictures.image import read_picture
-from objectmorpher_core.scripting.outputs import unmoved_cutout
+from objectmorpher_core.scripting.outputs import Export, unmoved_cutout
 
 
 @pytest.fixture
@@ -111,6 +111,15 @@ def test_layers_over_each_other_are_the_photo(moved: Editor) -> None:
         alpha = layer[..., 3:] / 255
         stacked = stacked * (1 - alpha) + layer[..., :3] * alpha
     assert np.abs(stacked - whole).max() <= 2
+
+
+def test_a_layers_file_name_says_how_it_is_mixed(moved: Editor) -> None:
+    item = moved.document.objects[0]
+    document = moved.document.with_object(
+        0, replace(item, finish=replace(item.finish, blend_mode="soft light"))
+    )
+    names = [path.name for path in Export(document).files("layers", Path("folder"))]
+    assert "ball-2-object-1-soft-light.png" in names
 
 
 def test_layers_in_one_file(moved: Editor, tmp_path: Path) -> None:
