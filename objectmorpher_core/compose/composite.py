@@ -493,21 +493,36 @@ def straight_cutout(result: Composite, dtype: np.dtype, size: tuple[int, int]) -
 
     They are drawn again, strip by strip: a composite does not keep what it has drawn.
     """
+    return _on_nothing(result.moved, result.camera, dtype, size)
+
+
+def lit_cutout(document: Document, k: int, progress: Progress = silent) -> np.ndarray:
+    """The moved object `k` alone, likewise, in the light that it has among the others."""
+    item, photo = document.objects[k], document.photo
+    things = tuple(thing for thing in _stack(document, {}) if thing.item is item)
+    return _on_nothing(things, photo.camera, photo.pixels.dtype, photo.size, progress)
+
+
+def _on_nothing(
+    things: tuple[Moved, ...], camera: Camera, dtype: np.dtype, size: tuple[int, int],
+    progress: Progress = silent,
+) -> np.ndarray:  # fmt: skip
     width, height = size
-    if not result.moved:
+    if not things:
         return np.zeros((height, width, 4), dtype)
-    cutout, box = drawn_alone(result.moved, result.camera, dtype)
+    cutout, box = drawn_alone(things, camera, dtype, progress)
     return crop(cutout, box, (0, 0, width, height))
 
 
 def drawn_alone(
-    things: tuple[Moved, ...], camera: Camera, dtype: np.dtype
+    things: tuple[Moved, ...], camera: Camera, dtype: np.dtype, progress: Progress = silent
 ) -> tuple[np.ndarray, Box]:
     """Some moved objects alone on nothing, (h, w, 4) straight alpha, and their box in the photo."""
     drawing = _Drawing(things, camera, hole_margin(camera.width, camera.height))
     x0, y0, x1, y1 = drawing.box
     cutout = np.zeros((y1 - y0, x1 - x0, 4), dtype)
     for top, bottom in drawing.strips():
+        progress((top - y0) / (y1 - y0), "Drawing the object")
         drawn = drawing.alone(top, bottom)
         drawn[..., :3] /= np.maximum(drawn[..., 3:], 1e-6)
         drawn[drawn[..., 3] <= 0] = 0

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.arrays import F32, U8, crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
 from ..base.quoting import shown
-from ..compose.composite import Composite, composite, object_texture, straight_cutout
+from ..compose.composite import lit_cutout, object_texture, straight_cutout
 from ..compose.layers import Layer, layers
 from ..compose.plate.plate import overlap, plate_alpha, plate_picture
 from ..deform.puppet import Puppet, puppet_of
@@ -230,19 +230,16 @@ class Export:
         """One object, or all that were edited, where they are now; straight colour and alpha."""
         photo = self.document.photo
         if self.edited is not None and self.object is None:
-            samples = self._drawn(self.edited.composite)
+            samples = straight_cutout(self.edited.composite, photo.pixels.dtype, photo.size)
         else:
-            thing = self.document.objects[self.object or 0]
+            k = self.object or 0
+            thing = self.document.objects[k]
             if thing.is_moved:
-                objects = (replace(thing, is_visible=True),)
-                alone = replace(self.document, objects=objects, plate=None, refined=None)
-                samples = self._drawn(composite(alone, progress=progress))
+                there = self.document.with_object(k, replace(thing, is_visible=True))
+                samples = lit_cutout(there, k, progress)
             else:
                 samples = unmoved_cutout(self.document, thing)
         return Picture(samples[..., :3], samples[..., 3], icc=photo.picture.icc)
-
-    def _drawn(self, result: Composite) -> np.ndarray:
-        return straight_cutout(result, self.document.photo.pixels.dtype, self.document.photo.size)
 
     def _solid(self, what: str, path: Path) -> bytes:
         """The posed object in 3D, as Gaussians or as a mesh."""

@@ -7,13 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose import load
+from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.light.harmonize import LEAST, MOST, NEUTRAL, light_gain, light_map
+from objectmorpher_core.compose.plate.plate import build_plate
 from objectmorpher_core.compose.shadow.shadow import GAMMA
 from objectmorpher_core.compose.silhouette import Silhouette, sketch
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.model import Placement, Prompt
+from objectmorpher_core.pipeline import lift_mask, open_photo
+from objectmorpher_core.scripting.outputs import Export
 from tests import shapes
+from tests.shapes import png
 
 
 def test_without_a_move_the_light_is_the_same():
@@ -87,3 +92,22 @@ def test_light_that_is_warmer_and_darker_is_both():
     places = [Silhouette(np.ones((10, 10), np.float32), left, 20.0, 1.0) for left in (10.0, 60.0)]
     red, green, blue = np.log(light_gain(light, 80, *places))
     assert blue < green < red < -0.05
+
+
+def test_a_cutout_is_lit_as_in_the_photo():
+    """By what is around it there, and not by itself, where it was."""
+    rng, (height, width) = np.random.default_rng(0), (240, 360)
+    y, x = np.mgrid[:height, :width]
+    mask = ((x - 90) / 45) ** 2 + ((y - 130) / 60) ** 2 < 1
+    grey = np.where(mask, 30, np.where(x < width / 2, 150, 112))[..., None]
+    pixels = np.rint(grey + rng.normal(0, 3, (height, width, 3))).clip(0, 255).astype(np.uint8)
+    photo = open_photo(png(pixels), "grey.png")
+    document = edits.set_mask(edits.add_object(photo), 0, mask, Prompt())
+    document = edits.set_lifted(document, 0, *lift_mask(pixels, photo.photo.camera, mask))
+    document = edits.set_plate(document, build_plate(pixels, mask, load("telea")))
+    document = edits.set_placement(document, 0, Placement(move=(180.0, 0.0)))
+    document = document.with_object(0, replace(document.objects[0], harmony=1.0))
+    drawn = straight_cutout(composite(document), np.dtype(np.uint8), document.photo.size)
+    found = Export(document, object=0).picture("object")
+    assert (drawn[..., 3] == 255).sum() > 500
+    np.testing.assert_array_equal(np.dstack([found.pixels, found.alpha]), drawn)
