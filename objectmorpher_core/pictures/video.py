@@ -159,7 +159,7 @@ def _below_half(level: int) -> int:
 
 
 def _palettes(has_alpha: bool, further: Iterable[U8]) -> Callable[[U8], Image.Image]:
-    """Makes pictures of 256 colours, for all those of the first and of `further` ones."""
+    """Makes pictures of 256 colours: those of the first one and of `further` ones, for all."""
     palette: list[Image.Image] = []
     count = CLEAR if has_alpha else 256
 
@@ -171,23 +171,12 @@ def _palettes(has_alpha: bool, further: Iterable[U8]) -> Callable[[U8], Image.Im
         else:
             is_clear, image = None, Image.fromarray(at_most(frame, GIF_LONGEST))
         if not palette:
-            shown = [image, *(Image.fromarray(at_most(each, GIF_LONGEST)) for each in further)]
-            palette.append(_side_by_side(shown).quantize(count, Image.Quantize.MEDIANCUT))
+            shown = [np.asarray(image), *(at_most(each, GIF_LONGEST) for each in further)]
+            colours = Image.fromarray(np.concatenate([each.reshape(1, -1, 3) for each in shown], 1))
+            palette.append(colours.quantize(count, Image.Quantize.MEDIANCUT))
         made = image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)
         if is_clear is not None:
             made.paste(CLEAR, mask=is_clear)
         return made
 
     return reduced
-
-
-def _side_by_side(images: list[Image.Image]) -> Image.Image:
-    width, height = sum(image.width for image in images), max(image.height for image in images)
-    if len(images) == 1:
-        return images[0]
-    joined = Image.new("RGB", (width, height), images[0].getpixel((0, 0)))
-    left = 0
-    for image in images:
-        joined.paste(image, (left, 0))
-        left += image.width
-    return joined

@@ -32,8 +32,8 @@ from ..base.camera import Camera
 from ..base.progress import Progress, silent
 from ..base.rotations import vector_from_matrix
 from ..compose.composite import composite
+from ..deform.interpolation import PoseInterpolation
 from ..deform.puppet import Puppet, puppet_of
-from ..deform.way import PoseWay
 from ..document.key_edits import at_key, count_keys
 from ..document.model import Document, EditObject, Handle, Matte, Photo, Placement, Plate, Pose
 from ..document.paint import Paint
@@ -322,7 +322,9 @@ class _Film:
             if item.lifted is not None
         }
         self._last: dict[int, Pose] = {}  # of each object, to go on from
-        self._ways: dict[int, tuple[Pose | None, Pose | None, PoseWay]] = {}  # the last of each
+        self._ways: dict[
+            int, tuple[Pose | None, Pose | None, PoseInterpolation]
+        ] = {}  # the last of each
         self._bodies: dict[int, F64] = {}  # see `_standing`
 
     def drawn(self, document: Document) -> U8:
@@ -425,7 +427,7 @@ class _Film:
         if known is None or known[0] is not start or known[1] is not end:
             deformer = self.puppets[k].deformer
             rest = deformer.rest()
-            known = start, end, PoseWay(deformer, start or rest, end or rest)
+            known = start, end, PoseInterpolation(deformer, start or rest, end or rest)
             self._ways[k] = known
         return known[2].at(share)
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 NAME, CELL = 26, 26  # characters of the table's columns
 FORMAT = ".4g"
-NAMED = 8  # pairs of which one line tells the names
+NAMED = 8  # pairs, at most, that one line names
 
 
 def add_evaluate(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.deform.arap import ArapSolver, iterate
 from objectmorpher_core.deform.constraints import Constraints, Targets
 from objectmorpher_core.deform.deformer import ANCHORED_SHARE, FAITHFUL_ITERATIONS, Deformer
-from objectmorpher_core.deform.way import PoseWay
+from objectmorpher_core.deform.interpolation import PoseInterpolation
 from objectmorpher_core.document.model import Handle
 from objectmorpher_core.document.pose import UNHELD, Pose
 from objectmorpher_core.document.settings import DeformSettings
@@ -300,7 +300,7 @@ def test_the_way_between_two_poses_carries_round_what_turns(bar, degrees):
     again = matrix_from_vector(axis)
     turns = again @ first.rotations
     last = Pose(first.points @ again.T + [0.2, 0.1, 0.0], turns)
-    way = PoseWay(bar, first, last)
+    way = PoseInterpolation(bar, first, last)
     for share, pose in ((0.0, first), (1.0, last)):
         found = way.at(share)
         np.testing.assert_allclose(found.points, pose.points, atol=1e-9)
@@ -317,7 +317,7 @@ def test_two_sides_of_a_thing_do_not_part_ways_at_half_a_turn(bar):
     """One end is twisted by 300 degrees, which are 60 the other way round."""
     rest, last = bar.rest(), _twisted(bar.points, np.radians(300.0))
     half = _twisted(bar.points, np.radians(150.0))
-    found = PoseWay(bar, rest, last).at(0.5)
+    found = PoseInterpolation(bar, rest, last).at(0.5)
     np.testing.assert_allclose(found.rotations, half.rotations, atol=1e-9)
     assert np.abs(found.points - half.points).max() < 0.02 * bar.diameter
 
@@ -327,7 +327,7 @@ def test_what_stays_in_two_poses_stays_on_the_way_and_the_rest_bends(bar):
     held = replace(held, is_pin=True, turn=np.zeros(3))
     bent = replace(_at(bar, (0.5, 0.0, 0.0), (-0.5, 0.5, 0.0)), turn=np.radians([0.0, 0.0, 150.0]))
     last = bar.solve((held, bent)).pose
-    way = PoseWay(bar, bar.rest(), last)
+    way = PoseInterpolation(bar, bar.rest(), last)
     is_still = np.linalg.norm(last.points - bar.points, axis=1) < 1e-9
     assert is_still.sum() > 2
     most = [bar.strain(pose).most.max() for pose in (last, way.at(0.25), way.at(0.5))]

@@ -25,7 +25,7 @@ LEAST = 1e-2  # x `STILL`: so that what does not move at all is tied by no more 
 RIGID = 1e3  # x the weight of a link inside a rigid body
 
 
-class PoseWay:
+class PoseInterpolation:
     """Costly to make, cheap to use."""
 
     def __init__(self, deformer: Deformer, start: Pose, end: Pose) -> None:
