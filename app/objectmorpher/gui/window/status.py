@@ -1,4 +1,4 @@
-"""The line at the bottom: hint or message left; job, zoom and size right."""
+"""The line at the bottom: message and hint left; job, zoom and size right."""
 
 from __future__ import annotations
 
@@ -21,6 +21,38 @@ JOB_DELAY = 0.15  # s; a job that is faster shows no bar
 LEAST_AREA = 0.05  # megapixels that are told
 BAR = 120.0  # points
 BAR_HEIGHT = 6.0
+BESIDE = 24.0  # points between a message and the hint
+GLANCE = 4.0  # s, in which the line is looked at
+PER_CHARACTER = 0.06  # s, in which one of them is read
+
+Places = tuple[float, ...]  # of the pointer, in whatever units
+
+
+class Reading:
+    """Whether the message that is shown has been read, so that the hint has the line again.
+
+    The time runs from when the pointer first moves: before that, somebody may have gone for a
+    coffee while a film was written.
+    """
+
+    def __init__(self) -> None:
+        self._message: StatusMessage | None = None
+        self._places: Places = ()  # of the pointer, when the message came
+        self._began: float | None = None  # s, when the pointer moved
+
+    def is_over(self, message: StatusMessage | None, places: Places, now: float) -> bool:
+        """Whether `message` was there for long enough at `now` s, with the pointer at `places`."""
+        if message is not self._message:
+            self._message, self._places, self._began = message, places, None
+        if message is None:
+            return False
+        if self._began is None and places != self._places:
+            self._began = now
+        needed = GLANCE + PER_CHARACTER * len(message.text)
+        return self._began is not None and now - self._began >= needed
+
+
+_reading = Reading()
 
 
 def draw_status(editor: Editor, rect: Rect, hint: str) -> None:
@@ -111,32 +143,54 @@ def _draw_bar(x: float, middle: float, fraction: float) -> None:
 
 
 def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
-    """The message until something else is done, else the hint."""
+    """The message until it was read or something else is done, and the hint where it has room."""
+    if _reading.is_over(editor.message, _pointer(editor), time.monotonic()):
+        editor.drop_hint()
     message, share = fades.shown("message", editor.message)
     imgui.push_clip_rect(ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True)
     imgui.set_cursor_pos(ImVec2(theme.pt(12), _line_y(rect)))
     if message is None:
-        shown = _whole_parts(hint, right - theme.pt(12))
-        imgui.text_colored(theme.vec("secondary"), shown)
-        mark(shown)
+        room = right - theme.pt(12)
+        _draw_hint(_whole_parts(hint, room) or _whole_words(hint, room))
     else:
         role = "error" if message.is_error else "text"
         icon = Icon.WARNING if message.is_error else Icon.INFO
         imgui.text_colored(theme.vec(role if message.is_error else "accent", share), icon)
         imgui.same_line(0, theme.pt(6))
         imgui.text_colored(theme.vec(role, share), message.text)
+        mark(message.text)
         if message is editor.message and (message.is_error or message.action is not None):
             _draw_buttons(editor, message)
+        imgui.same_line(0, theme.pt(BESIDE))
+        imgui.set_cursor_pos_y(_line_y(rect))
+        if shown := _whole_parts(hint, right - imgui.get_cursor_pos_x()):
+            _draw_hint(shown)
     imgui.pop_clip_rect()
 
 
+def _draw_hint(shown: str) -> None:
+    imgui.text_colored(theme.vec("secondary"), shown)
+    mark(shown)
+
+
+def _pointer(editor: Editor) -> Places:
+    """Where the mouse is, and the crosshair that the keyboard moves."""
+    mouse, pointer = imgui.get_io().mouse_pos, editor.pointer
+    return (mouse.x, mouse.y) if pointer is None else (mouse.x, mouse.y, pointer.x, pointer.y)
+
+
 def _whole_parts(hint: str, room: float) -> str:
-    """As many of a hint's parts as have room (window units), or of the first one's words."""
-    while imgui.calc_text_size(hint).x > room and " · " in hint:
+    """As many of a hint's parts as have room (window units); "" where the first has none."""
+    while imgui.calc_text_size(hint).x > room:
         hint = hint.rpartition(" · ")[0]
-    if imgui.calc_text_size(hint).x <= room:
-        return hint
-    words = hint.split(" ")
+        if not hint:
+            return ""
+    return hint
+
+
+def _whole_words(hint: str, room: float) -> str:
+    """As many words of a hint's first part as have room (window units)."""
+    words = hint.partition(" · ")[0].split(" ")
     while words and imgui.calc_text_size(" ".join(words) + "…").x > room:
         words.pop()
     return " ".join(words) + "…" if words else ""
