@@ -148,6 +148,24 @@ def test_what_waits_for_a_job_that_is_nobodys_is_shown(worker: Jobs) -> None:
     assert worker.shown is None
 
 
+def test_what_a_job_of_the_users_holds_up_is_known(worker: Jobs) -> None:
+    log = Log()
+    start(worker, log, job_functions.wait, 5.0, kind="write")
+    run_until(worker, lambda: worker.current is not None and worker.current.fraction > 0)
+    assert worker.held_up == ()
+    for kind in ("segment", "lift"):
+        start(worker, log, job_functions.double, np.ones(3), kind=kind)
+    worker.start("Quiet", job_functions.double, np.ones(3), done=log.answers.append,
+                 failed=log.errors.append, kind="draw", is_quiet=True)  # fmt: skip
+    assert worker.shown is worker.current
+    assert [job.kind for job in worker.held_up] == ["segment", "lift"]
+    start(worker, log, job_functions.double, np.ones(3), kind="write")
+    assert "write" not in [job.kind for job in worker.held_up], "it takes the other's place"
+    worker.cancel()
+    run_until(worker, lambda: worker.is_idle)
+    assert worker.held_up == ()
+
+
 def test_a_failure_is_a_sentence(worker: Jobs) -> None:
     log = Log()
     start(worker, log, job_functions.fail)

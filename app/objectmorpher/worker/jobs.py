@@ -141,6 +141,13 @@ class Jobs(Executor):
         jobs = (self.current, *self._waiting.values())  # what waits for a quiet one is shown, too
         return next((job for job in jobs if job is not None and not job.is_quiet), None)
 
+    @property
+    def held_up(self) -> tuple[Request, ...]:
+        """Return the user's requests that wait for what is shown; not those that replace it."""
+        shown = self.shown
+        rest = [job for job in self._waiting.values() if job is not shown and not job.is_quiet]
+        return tuple(job for job in rest if shown is None or job.kind != shown.kind)
+
     def is_busy(self, kind: str) -> bool:
         current = self.current
         runs = current is not None and current.kind == kind and current.stop_asked is None

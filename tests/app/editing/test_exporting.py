@@ -16,6 +16,7 @@ from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.export_plan import FORMATS, Format, VideoMotion, What
 from objectmorpher.editor.settings import Settings
+from objectmorpher.gui.window.status import job_text
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.pictures.image import read_picture
@@ -254,6 +255,24 @@ def test_an_export_that_is_stopped_says_so(moved: Editor, tmp_path: Path) -> Non
     wait_for_jobs(moved)
     assert moved.message is not None and moved.message.text == f"{path.name} was not written"
     assert not path.exists()
+
+
+def test_what_waits_for_a_film_is_told_beside_it(moved: Editor, tmp_path: Path) -> None:
+    """Another object is lifted while a film is written, on which that may take minutes."""
+    thing = moved.chosen
+    assert thing.mask is not None and moved.document is not None
+    other = edits.add_object(moved.document)
+    moved.apply("Select", edits.set_mask(other, 1, thing.mask, thing.prompt))
+    path = film(moved, tmp_path)
+    moved.current = 1
+    run(moved, "lift")
+    job = moved.jobs.shown
+    assert job is not None and job.title == f"Exporting {path.name}"
+    told = job_text(job, moved.jobs.held_up)
+    assert told.endswith(" · waiting: Lifting the object"), told
+    wait_until(moved, lambda: moved.is_lifted)
+    assert path.exists() and moved.jobs.held_up == ()
+    wait_for_jobs(moved)
 
 
 def test_a_file_that_cannot_be_written_ends_the_waiting(moved: Editor, ball: Document) -> None:

@@ -106,6 +106,17 @@ def _shown_job(editor: Editor) -> tuple[Executor, Request] | None:
     return None if job is None else (editor.jobs, job)
 
 
+def job_text(job: Request, held_up: tuple[Request, ...]) -> str:
+    """What a job does, and which of the user's wait for it to end."""
+    text = job.title if job.note in ("", job.title) else f"{job.title}: {job.note}"
+    if not held_up:
+        return text
+    first, count = held_up[0].title, len(held_up) - 1
+    if count:
+        return t("{job} · waiting: {first} and {count} more", job=text, first=first, count=count)
+    return t("{job} · waiting: {first}", job=text, first=first)
+
+
 def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     """Name, bar, share and Cancel; the left end of what it drew."""
     shown = _shown_job(editor)
@@ -113,7 +124,9 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
         return right
     executor, job = shown
     side = rect.height - theme.pt(4)
-    text = job.title if job.note in ("", job.title) else f"{job.title}: {job.note}"
+    now = time.monotonic()
+    held_up = editor.jobs.held_up if executor is editor.jobs else ()
+    text = job_text(job, tuple(each for each in held_up if now - each.asked >= JOB_DELAY))
     share = f"{100 * job.fraction:.0f} %"
     gap = theme.pt(8)
     x = right - theme.pt(16) - side
