@@ -152,3 +152,23 @@ def test_a_hidden_object_is_not_moved_unseen(
         hands.choose("Show object")
         hands.area("Ring: yaw")
         hands.area("Right")
+
+
+def test_the_select_tool_marks_a_moved_object_where_it_is_seen(
+    without_networks: dict[str, str], ball: Document, tmp_path: Path
+) -> None:
+    session, move = tmp_path / "balls.omorph", np.array((50.0, 0.0))
+    two = edits.duplicate(ball, 0)
+    save_session(edits.set_placement(two, 1, Placement(move=(50.0, 0.0))), session)
+    with opened(without_networks, session) as hands:
+        hands.place("row of Object 1 copy")
+        hands.catch_up()
+        hands.choose("row of Object 1")
+        hands.press("1")
+        hands.settle()
+        at = np.array(hands.on_photo(*(CENTRE + move), (WIDTH, HEIGHT)))
+        hands.xdotool("mousemove", *at.round().astype(int))
+        x0, y0, x1, y1 = hands.area("Other: Object 1 copy")
+        np.testing.assert_allclose(((x0 + x1) / 2, (y0 + y1) / 2), at, atol=24)
+        hands.xdotool("mousemove", *map(round, hands.on_photo(5, 5, (WIDTH, HEIGHT))))
+        hands.wait(lambda: "Other: Object 1 copy" not in hands.places(), "leaving it")

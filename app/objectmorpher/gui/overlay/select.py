@@ -8,6 +8,7 @@ from imgui_bundle import ImVec2
 from ...tools.brush_tools import erases
 from ..widgets.panes import fades
 from ..widgets.theme import theme
+from ..window.landmarks import mark_on_canvas
 from .canvas import ACCENT, DARK, WARM, WHITE, CanvasPainter
 
 DOTS = 6.0  # points between the dots of a dotted line
@@ -34,6 +35,7 @@ def draw_selection(canvas: CanvasPainter) -> None:
         if editor.landing.is_current_moved and document is not None and click.is_foreground:
             place = editor.derived.carried(document, editor.current, place)
         _draw_click(canvas, canvas.at(place)[0], click.is_foreground)
+    draw_other(canvas)
     if editor.rubber is not None:
         draw_rubber(canvas)
     if editor.selection.path is not None:
@@ -140,5 +142,7 @@ def draw_other(canvas: CanvasPainter) -> None:
     if document.objects[other].lifted is None:
         return
     corners = canvas.at(editor.derived.frame(document, other).corners)
+    name = document.objects[other].name
     canvas.dashes(corners, WHITE)
-    canvas.label(document.objects[other].name, corners[3].x, corners[3].y)
+    canvas.label(name, corners[3].x, corners[3].y)
+    mark_on_canvas(f"Other: {name}", corners[0], corners[2])
