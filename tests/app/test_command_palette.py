@@ -94,6 +94,11 @@ def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Ed
         ("hide", "Hide object"), ("take away", "Hide object"), ("animation", "Add key pose"),
         ("remove object", "Take out of the photo"), ("delete", "Take out of the photo"),
         ("erase", "Take out of the photo"), ("discard", "Put back into the photo"),
+        ("recover", "Recover unsaved work"), ("autosave", "Recover unsaved work"),
+        ("mirror object", "Symmetry"), ("brush size", "Larger brush"), ("rectangle", "Select by"),
+        ("delete handle", "Remove handle"), ("remove shadow", "Add or remove shadow"),
+        ("undo", "Undo"), ("redo", "Redo"), ("duplicate", "Duplicate object"),
+        ("stop", "Cancel the running job"), ("load", "Open…"),
     ):  # fmt: skip
         palette._typed = typed
         assert title in [entry.title for entry in palette._found(editor)][:3], typed

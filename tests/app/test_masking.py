@@ -487,9 +487,11 @@ def test_a_box_is_new_added_or_taken_away(editor: Editor) -> None:
 def test_clicks_begin_and_correct_whatever_is_dragged(editor: Editor, mode: SelectMode) -> None:
     editor.view.selecting.mode = mode
     ball = editor.view.canvas_from_image(np.array(CENTRE))
+    assert mode is SelectMode.LASSO or "click" in SelectTool().hint(editor)
     stroke(editor, SelectTool(), ball)
     wait_for_jobs(editor)
     assert editor.mask is not None and editor.mask[round(CENTRE[1]), round(CENTRE[0])]
+    assert mode is SelectMode.LASSO or "Click adds" in SelectTool().hint(editor)
     wall = editor.view.canvas_from_image(np.array(FAR))
     stroke(editor, SelectTool(), wall, alt=True)
     wait_for_jobs(editor)

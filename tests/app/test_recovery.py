@@ -9,6 +9,7 @@ import pytest
 
 from edit_until_killed import base_document, step_document
 from editor_steps import close_all, wait_until
+from objectmorpher.commands import run, why_not
 from objectmorpher.editor.autosave import LOCK, FileLock, recovery_root
 from objectmorpher.editor.editor import Editor
 from objectmorpher_core.session.journal import DOCUMENT, Journal
@@ -53,6 +54,22 @@ def test_every_crashed_editor_is_listed_the_newest_first(editor: Editor) -> None
     editor.message.action.run()
     wait_until(editor, lambda: editor.chores.is_idle)
     assert editor.message is not None and "Recovered cat.jpg" in editor.message.text
+
+
+def test_a_command_recovers_what_was_left_or_shows_the_list(editor: Editor) -> None:
+    editor.recovery.look()
+    assert why_not(editor, "recover") == "No unsaved work of an earlier session is there"
+    leave("cat", 9), leave("dog", 14)
+    editor.recovery.look()
+    run(editor, "recover")
+    assert editor.message is not None
+    assert editor.message.text == "Choose in the list what to recover"
+    assert editor.document is None and len(editor.recovery.left) == 2
+    recover(editor, "dog")
+    run(editor, "recover")
+    wait_until(editor, lambda: editor.chores.is_idle)
+    assert editor.message is not None and "Recovered cat.jpg" in editor.message.text
+    assert len(editor.tabs.all) == 2 and editor.recovery.left == ()
 
 
 def test_what_is_recovered_is_unsaved_and_stays_safe(editor: Editor) -> None:

@@ -48,10 +48,16 @@ def _nothing_open(editor: Editor) -> str | None:
 
 
 _no_other_tab = unless(lambda e: len(e.tabs.all) > 1, lambda e: t("No other photo is open"), never)
+_nothing_left = unless(
+    lambda e: e.recovery.left, lambda e: t("No unsaved work of an earlier session is there"), never
+)
 
 
 FILE_COMMANDS: dict[str, Command] = {
     "open": Command("Open…", "Ctrl+O", asks_for(Dialog.OPEN), never),
+    "recover": Command(
+        "Recover unsaved work", "", lambda e: e.recovery.recover_left(), _nothing_left
+    ),
     "new_tab": Command("New tab", "Ctrl+T", lambda e: e.tabs.add(), no_photo),
     "next_tab": Command("Next tab", "Ctrl+Tab", lambda e: e.tabs.step(1), _no_other_tab),
     "previous_tab": Command(

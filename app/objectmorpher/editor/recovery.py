@@ -88,6 +88,15 @@ class Recovery:
             editor.say(text, Action(t("Show"), self._tabs.add))
         self._offer = editor.message
 
+    def recover_left(self) -> None:
+        """Recovers what was left; where there is more of it, the start screen lists it."""
+        if len(self.left) == 1 and not self.left[0].problem:
+            self.recover(self.left[0])
+        elif self._editor.document is not None:
+            self._tabs.add()
+        else:
+            self._editor.say(t("Choose in the list what to recover"))
+
     def put_off(self) -> None:
         """The tab is left: what is still offered there is offered again when a file has opened."""
         if self._offer is not None and self._editor.message is self._offer:

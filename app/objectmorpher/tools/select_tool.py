@@ -128,14 +128,17 @@ def _combine(pointer: Pointer) -> Combine:
 
 _BEGIN = {
     SelectMode.CLICK: lambda: t("Click an object, or drag a box around it"),
-    SelectMode.BOX: lambda: t("Drag a box around an object"),
+    SelectMode.BOX: lambda: t("Drag a box around an object, or click it"),
     SelectMode.LASSO: lambda: t("Drag around the object"),
 }
 _GO_ON = {
     SelectMode.CLICK: lambda: t(
         "Click adds · Right-click removes · Click again: part, object, group · Drag: a new box"
     ),
-    SelectMode.BOX: lambda: t("Drag a new box · Shift-drag adds its object · Alt-drag removes it"),
+    SelectMode.BOX: lambda: t(
+        "Drag: a new box · Shift-drag adds what is in it · Alt-drag takes that away · "
+        "Click adds · Right-click removes"
+    ),
     SelectMode.LASSO: lambda: t(
         "Drag around: a new selection · Shift adds to it · Alt removes from it"
     ),

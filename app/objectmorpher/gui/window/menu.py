@@ -65,8 +65,8 @@ def _draw_tool(editor: Editor, tool: ToolName, icon: str, name: str, hint: str) 
 LEAST_NAME = 48.0  # points of room, with less the file's name is left out
 MENUS: dict[str, tuple[str, ...]] = {
     "File": (
-        "new_tab", "open", "recent", "-", "save", "save_as", "export", "send_back", "-", "close",
-        "quit",
+        "new_tab", "open", "recent", "recover", "-", "save", "save_as", "export", "send_back", "-",
+        "close", "quit",
     ),
     "Edit": (
         "undo", "redo", "-", "copy_object", "copy", "paste", "paste_object", "-",
