@@ -63,6 +63,7 @@ class Settings:
     export_format: str = ""  # empty: the photo's own
     export_bits: int = 0  # 8 or 16; 0: the photo's own
     export_film: str = ""  # format of videos; empty: the first there is
+    export_layers: str = ""  # format of layers, likewise
     export_motion: str = "Photo to edit"
     export_seconds: float = 4.0
     export_folder: str = ""  # for photos that are no file of the user's

@@ -123,6 +123,30 @@ def test_a_layers_file_name_says_how_it_is_mixed(moved: Editor) -> None:
     assert "ball-2-object-1-soft-light.png" in names
 
 
+def test_layers_of_a_png_photo_are_one_file_until_a_folder_is_chosen(
+    moved: Editor, tmp_path: Path
+) -> None:
+    exporting = moved.exporting
+
+    def proposed() -> Path:
+        exporting.open()
+        exporting.choose_what(What.LAYERS)
+        path = exporting.path
+        exporting.close()
+        return path
+
+    assert moved.document is not None and moved.document.photo.name == "ball.png"
+    assert proposed() == tmp_path / "ball-layers.ora"
+    export(moved, What.PHOTO, Format.WEBP)
+    assert proposed() == tmp_path / "ball-layers.ora", "what photos are written as is no matter"
+    for format, name in ((Format.PSD, "ball-layers.psd"), (Format.PNG, "ball-layers")):
+        export(moved, What.LAYERS, format)
+        assert proposed() == tmp_path / name, "as they were written last"
+        exporting.open()
+        assert exporting.path == tmp_path / "ball-edited.webp", "the photo as it was written last"
+        exporting.close()
+
+
 def test_layers_in_one_file(moved: Editor, tmp_path: Path) -> None:
     path = export(moved, What.LAYERS, Format.OPENRASTER)
     assert path.name == "ball-layers.ora"

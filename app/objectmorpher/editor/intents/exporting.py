@@ -127,7 +127,7 @@ class Exporting:
         """It has its usual name, unless another one was typed."""
         draft = self._draft
         is_usual = draft.name.strip() in ("", self._named(draft).name)
-        changed = self._fitting(self._filmed(replace(draft, what=what)))
+        changed = self._fitting(self._as_last(replace(draft, what=what)))
         self._change(self._named(changed) if is_usual else _ended(changed))
 
     def choose_format(self, format: Format) -> None:
@@ -374,11 +374,14 @@ class Exporting:
         usual = own if own in known else known[0]
         return draft if draft.format in known else replace(draft, format=usual)
 
-    def _filmed(self, draft: Draft) -> Draft:
-        """A video has the format of the last one, and never the photo's: pictures in a folder."""
-        if draft.what is not What.VIDEO or self._draft.what is What.VIDEO:
+    def _as_last(self, draft: Draft) -> Draft:
+        """Films and layers have the format of the last ones, at first that of one file, and never
+        the photo's: PNG files in a folder."""
+        settings = self._editor.settings
+        lasts = {What.VIDEO: settings.export_film, What.LAYERS: settings.export_layers}
+        if draft.what not in lasts or self._draft.what is draft.what:
             return draft
-        known, last = FORMATS[What.VIDEO], self._editor.settings.export_film
+        known, last = FORMATS[draft.what], lasts[draft.what]
         return replace(draft, format=next((f for f in known if f.value == last), known[0]))
 
     @property
@@ -428,14 +431,16 @@ class Exporting:
         editor = self._editor
         format = "" if draft.format is self.own_format else draft.format.value
         proposed = self._fitting(replace(draft, format=self._usual_format)).format
-        is_film = draft.what is What.VIDEO
-        if is_film or (draft.what is not What.PHOTO and draft.format is proposed):
+        is_film, is_layers = draft.what is What.VIDEO, draft.what is What.LAYERS
+        is_proposed = draft.what is not What.PHOTO and draft.format is proposed
+        if is_film or is_layers or is_proposed:
             format = editor.settings.export_format  # nobody chose another
         film = draft.format.value if is_film else editor.settings.export_film
+        layers = draft.format.value if is_layers else editor.settings.export_layers
         editor.tab.exported |= {draft.what}
         editor.settings = replace(
-            editor.settings, export_format=format, export_film=film, export_bits=draft.bits,
-            quality=draft.quality, webp_quality=draft.webp_quality,
+            editor.settings, export_format=format, export_film=film, export_layers=layers,
+            export_bits=draft.bits, quality=draft.quality, webp_quality=draft.webp_quality,
             export_motion=draft.motion.value, export_seconds=draft.seconds,
             export_folder=str(path.parent.absolute()),
         )  # fmt: skip
