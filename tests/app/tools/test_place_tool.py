@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from editor_steps import made_photo, wait_for_jobs
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
@@ -279,6 +282,41 @@ def below_ground(editor: Editor) -> float:
     splats = editor.derived.posed(editor.document, 0)
     body = splats.means[splats.rest.lifted.texture.solidity > 0.5]
     return float(hold.ground.below(body).max()) / hold.unit
+
+
+@pytest.mark.parametrize("name", ["as it is", "larger", "turned"])
+def test_reset_position_brings_what_stands_back_on_the_ground(
+    grounded: Editor, tmp_path: Path, name: str
+) -> None:
+    place, settings = grounded.placing, grounded.settings
+    assert grounded.document is not None
+    finish = grounded.document.objects[0].finish
+    place.nudge(18.0, 9.0)
+    if name == "larger":
+        place.move_to(place.scaled(place.placement, 1.6))
+        grounded.commit("Scale object")
+    elif name == "turned":
+        place.move_to(place.turned(place.placement, (0.0, 0.0, 50.0)))
+        grounded.commit("Turn object")
+    before = place.placement
+    assert before is not None
+    run(grounded, "reset_position")
+    now, thing = place.placement, grounded.object
+    assert now is not None and thing is not None
+    assert (now.scale, now.turn) == (before.scale, before.turn)
+    assert abs(below_ground(grounded)) < 1e-3
+    assert thing.finish == finish
+    if name == "as it is":
+        assert now == Placement() and not thing.is_moved
+        grounded.exporting.export_to(tmp_path / "out.png")
+        wait_for_jobs(grounded)
+        np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "out.png")), made_photo())
+    steps = grounded.history.cursor if grounded.history else 0
+    run(grounded, "reset_position")
+    assert grounded.history is not None and grounded.history.cursor == steps, "it is there"
+    run(grounded, "undo")
+    assert place.placement == before, "one step"
+    grounded.settings = settings
 
 
 def test_an_object_on_the_ground_slides_over_it(grounded: Editor) -> None:

@@ -331,8 +331,14 @@ class Placing:
             self._editor.commit(t("Back to where it was"))
 
     def reset_position(self) -> None:
+        """Back there as large and as turned as it is; what is to stand on the ground stands."""
         home = self.home
-        self._reset(t("Reset position"), lambda p: replace(p, move=home.move, depth=home.depth))
+
+        def moved_back(placement: Placement) -> Placement:
+            back = replace(placement, move=home.move, depth=home.depth)
+            return back if back == home else self.stood(back)
+
+        self._reset(t("Reset position"), moved_back)
 
     def reset_turn(self) -> None:
         self._reset(t("Reset turn"), lambda p: self.turned(p, (0.0, 0.0, 0.0)))
