@@ -128,7 +128,7 @@ OTHER_WORDS = {
 
 __all__ = [
     "COMMANDS", "GROUPS", "OTHER_WORDS", "Command", "hint_of", "keys_of", "label_of",
-    "next_step", "run", "take_next_step", "why_not",
+    "meaning_of", "next_step", "run", "take_next_step", "why_not",
 ]  # fmt: skip
 
 GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
@@ -171,6 +171,21 @@ def label_of(editor: Editor, name: str) -> str:
     """What a command is called; of the current object, where that makes a difference."""
     is_removing = name == "remove_object" and editor.object is not None
     return editor.objects.removing if is_removing else t(COMMANDS[name].label)
+
+
+def meaning_of(editor: Editor, name: str) -> str:
+    """What a command does, where its name alone leaves doubt; else ""."""
+    match name:
+        case "hide":
+            return t("Closes its eye in the list, or opens it: while it is hidden, the picture and "
+                     "exports show what is behind it")  # fmt: skip
+        case "take_out":
+            return t("Removes it from the picture and fills in what was behind it. It stays in "
+                     "the list, hidden: its eye brings it back as it was edited")  # fmt: skip
+        case "remove_object" if editor.objects.removing == t("Put back into the photo"):
+            return t("Drops what was done to it: it is in the picture, where the photo has it")
+        case _:
+            return ""
 
 
 def hint_of(editor: Editor, name: str) -> str:

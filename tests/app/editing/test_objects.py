@@ -21,7 +21,7 @@ from editor_steps import (
     wait_until,
 )
 from objectmorpher.canvas.frame import build_frame, drawn_order
-from objectmorpher.commands import COMMANDS, label_of, run, why_not
+from objectmorpher.commands import COMMANDS, label_of, meaning_of, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
@@ -156,11 +156,14 @@ def test_taking_out_shows_the_background_and_putting_back_the_photo(
     copied: Editor, ball: Document
 ) -> None:
     assert label_of(copied, "remove_object") == "Discard object", "a copy is in no photo"
+    assert meaning_of(copied, "remove_object") == ""
     run(copied, "remove_object")
     assert copied.history is not None and copied.history.undo_label == "Discard object"
     copied.start(edits.set_placement(ball, 0, Placement(move=(9.0, 0.0))))
     before = copied.document
     assert label_of(copied, "remove_object") == "Put back into the photo"
+    told = [meaning_of(copied, name) for name in ("hide", "take_out", "remove_object")]
+    assert all(told) and len(set(told)) == 3, "each is told apart from the others"
     run(copied, "take_out")
     assert copied.object is not None and not copied.object.is_visible
     assert copied.message is not None and copied.message.action is not None

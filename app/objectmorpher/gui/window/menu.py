@@ -6,7 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import COMMANDS, hint_of, keys_of, label_of, run
+from ...commands import COMMANDS, hint_of, keys_of, label_of, meaning_of, run
 from ...editor.editor import Editor
 from ...editor.view import Shown, ToolName
 from ...system.texts import t
@@ -147,8 +147,8 @@ def _draw_command(editor: Editor, name: str) -> None:
     if imgui.menu_item(f"{label}##{name}", keys_of(editor, name), is_on, reason is None)[0]:
         run(editor, name)
     mark(label)
-    if reason is not None:
-        tooltip(reason)
+    if told := reason or meaning_of(editor, name):
+        tooltip(told)
 
 
 def _draw_recent(editor: Editor) -> None:

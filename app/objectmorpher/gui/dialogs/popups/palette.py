@@ -8,7 +8,16 @@ from functools import partial
 
 from imgui_bundle import ImVec2, imgui
 
-from ....commands import COMMANDS, GROUPS, OTHER_WORDS, SETTINGS, keys_of, run, why_not
+from ....commands import (
+    COMMANDS,
+    GROUPS,
+    OTHER_WORDS,
+    SETTINGS,
+    keys_of,
+    meaning_of,
+    run,
+    why_not,
+)
 from ....editor.editor import Editor
 from ....editor.shortcuts import GESTURES
 from ....editor.view import Popup
@@ -83,8 +92,8 @@ class CommandPalette:
         if imgui.selectable(f"##{n}", n == self._chosen, 0, ImVec2(0, theme.pt(ROW)))[0]:
             self._choose(editor, entry)
         mark(entry.title)
-        if reason is not None:
-            tooltip(reason)
+        if told := reason or meaning_of(editor, entry.command):
+            tooltip(told)
         draw, pad = imgui.get_window_draw_list(), theme.pt(8)
         top = low.y + (theme.pt(ROW) - imgui.get_font_size()) / 2
         right = entry.keys or entry.group
