@@ -20,6 +20,7 @@ from ...document.bounds import NORMAL
 from ...document.model import Document, EditObject, LiftedObject, Matte
 from ...document.placement import down_at
 from ...document.settings import AS_IN_THE_PHOTO, Shadow
+from ...document.transparency import continued, is_seen
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, TextureSource
 from ..blend import Box
@@ -136,13 +137,21 @@ class Lighting:
 
     @cached_property
     def noise(self) -> Noise | None:
-        """The photo's grain."""
-        return find_noise(self._document.photo.pixels)
+        """The photo's grain, where it is not clear."""
+        picture = self._document.photo.picture
+        if picture.alpha is None:
+            return find_noise(picture.pixels)
+        # What touches black, which has no noise, is not asked.
+        return find_noise(np.where(is_seen(picture.alpha)[..., None], picture.pixels, 0))
 
     @cached_property
     def focus(self) -> PhotoDefocus:
-        """Return the blur of the photo."""
-        return PhotoDefocus(self._document.photo.pixels, plate_cover(self._document))
+        """Return the blur of the photo, where it is not clear."""
+        picture, covered = self._document.photo.picture, plate_cover(self._document)
+        if picture.alpha is None:
+            return PhotoDefocus(picture.pixels, covered)
+        seen = is_seen(picture.alpha)
+        return PhotoDefocus(continued(picture, np.zeros_like(seen)), covered | ~seen)
 
     @cached_property
     def _depth(self) -> F32 | None:
