@@ -11,9 +11,11 @@ import pytest
 
 from objectmorpher_core.base.arrays import Mask, Pixels
 from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import Lighting
 from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.compose.refine import refinement
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
 from objectmorpher_core.document.transparency import continued
@@ -103,9 +105,36 @@ def test_around_a_thing_on_clear_ground_nothing_says_what_light_it_has():
     assert all(np.isnan(light).mean() > 0.6 for light in lights)
 
 
+class Paling:
+    """Shows what it is shown, with its colours a little nearer to grey."""
+
+    name = "paling"
+
+    def missing(self) -> str | None:
+        """Return None: it runs everywhere."""
+        return None
+
+    def refine(self, original, coarse, object_alpha, progress, seed=0):
+        """Return `coarse`, paler where the edit is."""
+        paler = coarse + 0.3 * object_alpha[..., None] * (128 - coarse.astype(np.float32))
+        return np.rint(paler).astype(np.uint8)
+
+
 @everywhere
 def test_a_refiner_sees_nothing_that_is_hidden(where):
     first, *others = (coarse_edit(document) for document in _alike(where))
     for other in others:
         assert np.array_equal(other.coarse, first.coarse)
         assert np.array_equal(other.pixels, first.pixels)
+
+
+@everywhere
+def test_a_refined_picture_keeps_the_bytes_that_are_hidden(where):
+    """Only what is seen is refined."""
+    for document in _alike(where):
+        made = refinement.refine(coarse_edit(document), Paling(), silent, 0, 1.0)
+        picture, result = document.photo.picture, composite(edits.set_refined(document, made))
+        assert picture.alpha is not None and result.alpha is not None
+        is_hidden = (picture.alpha == 0) & (result.alpha == 0)
+        assert np.array_equal(result.pixels[is_hidden], picture.pixels[is_hidden])
+        assert result.shares.from_refiner > 0.3, "and all the rest is"
