@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -227,15 +227,20 @@ class Lighting:
     def caster(
         self, item: EditObject, splats: PosedSplats, horizon: float | None, is_sketch: bool = False
     ) -> Caster | None:
-        """Return the shadow that a moved object throws; None where it throws none."""
-        if not item.is_moved or not item.is_visible or item.shadow.strength <= 0:
+        """Return the shadow that a moved object throws; None where it throws none.
+
+        What is half transparent takes half of the light.
+        """
+        strength = item.shadow.strength * item.finish.opacity
+        if not item.is_moved or not item.is_visible or strength <= 0:
             return None
+        shadow = replace(item.shadow, strength=strength)
         camera = self._document.photo.camera
         most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
         standing = stand(splats, camera, horizon, item.grounded_shadow, most)
         if standing is None:
             return None
-        return Caster(item.shadow, standing, horizon, cells, self._depth)
+        return Caster(shadow, standing, horizon, cells, self._depth)
 
     def _gain(self, item: EditObject, splats: PosedSplats, rest: Callable[[], PosedSplats]) -> Gain:
         """The factors of an object's colours in the light of where it is now."""
