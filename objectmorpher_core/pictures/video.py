@@ -23,6 +23,8 @@ from .image import at_most
 CODECS = {".webm": "VP90", ".mp4": "vp09"}
 PICTURES = (".gif", ".webp")
 ENDINGS = (*CODECS, *PICTURES)
+# px, the shortest and the longest side: films lose an odd row, and a WebP counts in 14 bits.
+SIDES = {".webm": (2, 65535), ".mp4": (2, 65535), ".webp": (1, 16383)}
 GIF_LONGEST = 640  # px
 GIF_TICK = 10  # ms, of which a GIF's frames last whole numbers
 WEBP_QUALITY = 85
@@ -78,7 +80,8 @@ def encode_video(
     all, so that nothing flickers. Of their alpha WebP keeps all, GIF whether a pixel is there;
     films have none, and an even number of rows and columns: the last one is left out.
 
-    Raises VideoError for an unknown ending, no frames, and where the encoder is not there.
+    Raises VideoError for an unknown ending, no frames, frames of a size that the format does not
+    have, and where the encoder is not there.
     """
     ending = ending.lower()
     if ending not in ENDINGS:
@@ -87,10 +90,22 @@ def encode_video(
     first = next(coming, None)
     if first is None:
         raise VideoError("a video needs a frame")
+    _check_size(first, ending)
     everything = chain([first], coming)
     if ending in CODECS:
         return _filmed(everything, first.shape, rate, ending)
     return _pictured(everything, rate, ending, first.shape[2] == 4, further)
+
+
+def _check_size(frame: U8, ending: str) -> None:
+    """Raises VideoError where a format has no frames of that size; those of GIF are made small."""
+    height, width = frame.shape[:2]
+    least, most = SIDES.get(ending, (1, max(width, height)))
+    if min(width, height) < least or max(width, height) > most:
+        raise VideoError(
+            f"a video of {width} x {height} px cannot be written as {ending}, "
+            f"whose sides have {least} to {most} px"
+        )
 
 
 def _filmed(frames: Iterable[U8], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
