@@ -141,7 +141,7 @@ def composite(
             blend.add(drawn)
     pixels, footprint, share = blend.pixels, blend.footprint, 0.0
     if document.refined is not None:
-        pixels, share = with_refined(photo, pixels, document.refined)
+        pixels, share = with_refined(photo, pixels, document.refined, blend.alpha)
     changed, outside = _count_changes((photo, alpha), (pixels, blend.alpha), footprint)
     from_photo, from_lifter, from_inpainter, paint = ((1 - share) * own for own in blend.shares())
     shares = Shares(from_photo, from_lifter, from_inpainter, share, paint)
@@ -533,10 +533,12 @@ def drawn_alone(
 # The refinement over the composite: seen inside the footprint only, as strongly as is wanted.
 
 
-def with_refined(photo: Pixels, pixels: Pixels, refined: Refined) -> tuple[Pixels, float]:
+def with_refined(
+    photo: Pixels, pixels: Pixels, refined: Refined, alpha: np.ndarray | None = None
+) -> tuple[Pixels, float]:
     """`pixels` (H, W, 3), an edited `photo`, refined; and the refiner's share of what changed.
 
-    Where the refinement's alpha is 0, the integers stay as they are.
+    Where the refinement's alpha is 0, or the edit's `alpha` (H, W), the integers stay as they are.
     """
     x0, y0, x1, y1 = refined.box
     weights = refined.weights
@@ -544,8 +546,11 @@ def with_refined(photo: Pixels, pixels: Pixels, refined: Refined) -> tuple[Pixel
     base = unit_pixels(old)
     mixed = base + weights[..., None] * (unit_pixels(refined.pixels) - base)
     result = pixels.copy()
-    shown = (weights > 0)[..., None]
-    result[y0:y1, x0:x1] = np.where(shown, pixels_from_unit(mixed, old.dtype), old)
+    shown = weights > 0
+    if alpha is not None:
+        shown &= alpha[y0:y1, x0:x1] > 0
+    new = pixels_from_unit(mixed, old.dtype)
+    result[y0:y1, x0:x1] = np.where(shown[..., None], new, old)
     whole = int(differ(result, photo).sum())
     is_changed = differ(result[y0:y1, x0:x1], photo[y0:y1, x0:x1])
     total = float(weights[is_changed].sum(dtype=np.float64))

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import crop, pixels_from_unit
+from ..base.arrays import Mask, crop, pixels_from_unit, unit_pixels
 from ..base.masks import box_of
 from ..base.progress import Progress, part, silent
 from ..document.bounds import NORMAL
 from ..document.model import Document, EditObject, Matte, Plate
 from ..document.settings import Refined
+from ..document.transparency import alpha_behind
 from .blend import Box
 from .composite import Composite, Moved, composite, drawn_alone, whole_box
 from .light.relight import Relit
@@ -29,6 +30,7 @@ PHOTO, BACKGROUND, UNTOUCHED = "Photo", "Background", "Photo, untouched"
 REFINEMENT = "Refinement"
 EMPTY = "Background without all objects"
 SHADOW = "Shadow of {name}"
+SOLID = 1 - 1e-6  # alpha, from which on only its arithmetic is not opaque
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +60,16 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
     result = composite(document, progress=part(progress, 0.0, 0.5), keeps_weights=True)
     photo, size = document.photo.pixels, document.photo.size
     pile: list[Layer] = []
-    own = plate_of_holes(document, holes(document)) if result.stack else document.plate
+    gone = holes(document)
+    own = plate_of_holes(document, gone) if result.stack else document.plate
     whole = document.plate
     if own is not None and whole is not None and own.hole is not whole.hole:  # not merely darker
         pile.append(_background(EMPTY, whole, is_shown=False))
     if own is not None and own.hole.any():
         pile.append(_background(BACKGROUND, own))
+    behind, ground = document.photo.picture.alpha, len(pile)
+    if behind is not None and own is not None:
+        behind = alpha_behind(behind, own, gone)
     shown = [thing for thing in result.stack if thing.item.is_visible]
     for thing in shown:
         if thing.look.shade is not None:
@@ -75,7 +81,7 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
         progress(0.5 + 0.4 * k / len(shown), "drawing")
         drawn = _clipped(thing.item.name, *_drawn(thing, document), size)
         pile += [replace(layer, mode=thing.look.mode) for layer in drawn]
-    untouched = _untouched(document, result, pile)
+    untouched = _untouched(document, result, pile, _is_open(behind, pile[ground:]))
     above = [] if document.refined is None or not result.stack else _refined(document.refined)
     return result, [Layer(PHOTO, photo), *pile, *untouched, *above]
 
@@ -142,11 +148,31 @@ def _trimmed(name: str, pixels: np.ndarray, box: Box) -> list[Layer]:
     return [Layer(name, inner, box[0] + x0, box[1] + y0)]
 
 
-def _untouched(document: Document, result: Composite, pile: list[Layer]) -> list[Layer]:
+def _is_open(behind: np.ndarray | None, pile: list[Layer]) -> Mask | None:
+    """(H, W) where a layer is mixed with what is not opaque in the edit, as it is in the pile.
+
+    What of it lies over nothing has its own colours in the edit, whatever its mode. `behind`
+    (H, W): the alpha of what lies below the `pile`; None: all of it is opaque.
+    """
+    if behind is None or all(layer.mode == NORMAL for layer in pile):
+        return None
+    cover, found = unit_pixels(behind), np.zeros(behind.shape, bool)
+    for layer in pile:
+        x0, y0, x1, y1 = layer.box
+        own, below = unit_pixels(layer.pixels[..., 3]), cover[y0:y1, x0:x1]
+        if layer.mode != NORMAL:
+            found[y0:y1, x0:x1] |= (own > 0) & (below < SOLID)
+        below += own * (1 - below)
+    return found
+
+
+def _untouched(
+    document: Document, result: Composite, pile: list[Layer], is_open: Mask | None
+) -> list[Layer]:
     """The photo over all that is drawn, as far as the edit does not show there.
 
-    Where the result is not opaque, it is there itself: the layers below are over the photo's
-    colours under clear ground, and not over nothing.
+    Where the result is not opaque, or is mixed with what is not (`is_open`, (H, W)), it is there
+    itself: the layers below are over the photo's colours under clear ground, and not over nothing.
     """
     if not pile:
         return []
@@ -163,6 +189,8 @@ def _untouched(document: Document, result: Composite, pile: list[Layer]) -> list
     photo = document.photo.pixels
     if result.alpha is not None:  # under the mask of the pile, what is soft has its own colour
         soft = drawn & (result.alpha < np.iinfo(photo.dtype).max)
+        if is_open is not None:
+            soft |= is_open
         alpha[soft] = 1
         photo = np.where(soft[..., None], result.pixels, photo)
     samples = np.dstack([photo, pixels_from_unit(alpha, photo.dtype)])

@@ -164,12 +164,17 @@ def continued(picture: Picture, covered: Mask) -> Pixels:
     """
     if picture.alpha is None:
         return picture.pixels
-    is_seen = picture.alpha > CLEAR * np.iinfo(picture.alpha.dtype).max
-    known = is_seen & ~covered
-    if not known.any() or is_seen.all():
+    seen = is_seen(picture.alpha)
+    known = seen & ~covered
+    if not known.any() or seen.all():
         return picture.pixels
-    return frozen(np.where((is_seen | covered)[..., None], picture.pixels,
+    return frozen(np.where((seen | covered)[..., None], picture.pixels,
                            _nearest(picture.pixels, known)))  # fmt: skip
+
+
+def is_seen(alpha: np.ndarray) -> Mask:
+    """(h, w) where a photo's alpha (h, w) is enough for its colours to be relied on."""
+    return alpha > CLEAR * np.iinfo(alpha.dtype).max
 
 
 def _nearest(image: np.ndarray, known: Mask) -> np.ndarray:

@@ -23,6 +23,8 @@ from .image import at_most
 CODECS = {".webm": "VP90", ".mp4": "vp09"}
 PICTURES = (".gif", ".webp")
 ENDINGS = (*CODECS, *PICTURES)
+# px, the shortest and the longest side: films lose an odd row, and a WebP counts in 14 bits.
+SIDES = {".webm": (2, 65535), ".mp4": (2, 65535), ".webp": (1, 16383)}
 GIF_LONGEST = 640  # px
 GIF_TICK = 10  # ms, of which a GIF's frames last whole numbers
 WEBP_QUALITY = 85
@@ -74,11 +76,12 @@ def encode_video(
 ) -> bytes:
     """The file of `frames` (h, w, 3 or 4), all of one size, shown `rate` a second, for ever.
 
-    A format of few colours has those of the first frame and of `further` pictures (h, w, 3), for
-    all, so that nothing flickers. Of their alpha WebP keeps all, GIF whether a pixel is there;
+    A format of few colours has those of the first frame and of `further` pictures (h, w, 3 or 4),
+    for all, so that nothing flickers. Of their alpha WebP keeps all, GIF whether a pixel is there;
     films have none, and an even number of rows and columns: the last one is left out.
 
-    Raises VideoError for an unknown ending, no frames, and where the encoder is not there.
+    Raises VideoError for an unknown ending, no frames, frames of a size that the format does not
+    have, and where the encoder is not there.
     """
     ending = ending.lower()
     if ending not in ENDINGS:
@@ -87,10 +90,22 @@ def encode_video(
     first = next(coming, None)
     if first is None:
         raise VideoError("a video needs a frame")
+    _check_size(first, ending)
     everything = chain([first], coming)
     if ending in CODECS:
         return _filmed(everything, first.shape, rate, ending)
     return _pictured(everything, rate, ending, first.shape[2] == 4, further)
+
+
+def _check_size(frame: U8, ending: str) -> None:
+    """Raises VideoError where a format has no frames of that size; those of GIF are made small."""
+    height, width = frame.shape[:2]
+    least, most = SIDES.get(ending, (1, max(width, height)))
+    if min(width, height) < least or max(width, height) > most:
+        raise VideoError(
+            f"a video of {width} x {height} px cannot be written as {ending}, "
+            f"whose sides have {least} to {most} px"
+        )
 
 
 def _filmed(frames: Iterable[U8], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
@@ -158,25 +173,41 @@ def _below_half(level: int) -> int:
     return 255 if level < 128 else 0
 
 
+def _small(frame: U8) -> tuple[Image.Image, Image.Image | None]:
+    """A frame (h, w, 3 or 4) as a GIF has it, and 255 where it is clear; None where it is not."""
+    if frame.shape[2] == 3:
+        return Image.fromarray(at_most(frame, GIF_LONGEST)), None
+    image = Image.fromarray(frame)  # its alpha is heeded as it is made smaller
+    image.thumbnail((GIF_LONGEST, GIF_LONGEST), Image.Resampling.BOX)
+    return image.convert("RGB"), image.getchannel("A").point(_below_half)
+
+
+def _shown_colours(image: Image.Image, clear: Image.Image | None) -> RGB:
+    """(n, 3) of the pixels that are not clear."""
+    pixels = np.asarray(image)
+    there = np.ones(pixels.shape[:2], bool) if clear is None else np.asarray(clear) == 0
+    return np.asarray(pixels[there], np.uint8)
+
+
 def _palettes(has_alpha: bool, further: Iterable[U8]) -> Callable[[U8], Image.Image]:
-    """Makes pictures of 256 colours: those of the first one and of `further` ones, for all."""
+    """Makes pictures of 256 colours: those of the first one and of `further` ones, for all.
+
+    What nobody sees takes none of them.
+    """
     palette: list[Image.Image] = []
     count = CLEAR if has_alpha else 256
 
     def reduced(frame: U8) -> Image.Image:
-        if has_alpha:  # which Pillow heeds when it makes a picture smaller
-            image = Image.fromarray(frame)
-            image.thumbnail((GIF_LONGEST, GIF_LONGEST), Image.Resampling.BOX)
-            is_clear, image = image.getchannel("A").point(_below_half), image.convert("RGB")
-        else:
-            is_clear, image = None, Image.fromarray(at_most(frame, GIF_LONGEST))
+        image, clear = _small(frame)
         if not palette:
-            shown = [np.asarray(image), *(at_most(each, GIF_LONGEST) for each in further)]
-            colours = Image.fromarray(np.concatenate([each.reshape(1, -1, 3) for each in shown], 1))
-            palette.append(colours.quantize(count, Image.Quantize.MEDIANCUT))
+            several = [_shown_colours(image, clear)]
+            several += [_shown_colours(*_small(each)) for each in further]
+            shown = np.concatenate(several)
+            shown = shown if len(shown) else np.zeros((1, 3), np.uint8)
+            palette.append(Image.fromarray(shown[None]).quantize(count, Image.Quantize.MEDIANCUT))
         made = image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)
-        if is_clear is not None:
-            made.paste(CLEAR, mask=is_clear)
+        if clear is not None:
+            made.paste(CLEAR, mask=clear)
         return made
 
     return reduced

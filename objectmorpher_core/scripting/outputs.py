@@ -34,6 +34,7 @@ from .options import ScriptError
 
 SOLID = 0.5  # alpha from which on a pixel shows an object
 TOP = 65535
+SAMPLED = 8  # frames, as far apart as they can be, whose colours a film of few colours has
 
 
 def depth_map(
@@ -137,8 +138,8 @@ class Export:
         if what == "video":
             icc = self.document.photo.picture.icc
             film = in_srgb(self._film(), icc)  # players know no other colours
-            edited = in_srgb(self._edited_frame(path.suffix), icc)
-            return encode_video(film, self.clip.rate, path.suffix, edited)
+            further = in_srgb(self._shown_in(path.suffix), icc)
+            return encode_video(film, self.clip.rate, path.suffix, further)
         if what in ("splats", "mesh"):
             return self._solid(what, path)
         return self._encoded(self.picture(what), path.suffix)
@@ -161,10 +162,16 @@ class Export:
     def _film(self) -> Iterator[U8]:
         return frames(self.document, self.clip, part(self.progress, 0.02, 0.95))
 
-    def _edited_frame(self, ending: str) -> Iterator[U8]:
-        """The edit as it is exported, for a format that has few colours; else nothing."""
+    def _shown_in(self, ending: str) -> Iterator[U8]:
+        """The edit and some of the film's frames, for a format that has few colours; else nothing.
+
+        What shows only midway has its colours, too.
+        """
         if ending.lower() == ".gif":
-            yield to_u8(self.picture("photo").pixels)
+            picture = self.picture("photo")
+            layers = [picture.pixels] if picture.alpha is None else [picture.pixels, picture.alpha]
+            yield to_u8(np.dstack(layers))
+            yield from frames(self.document, replace(self.clip, seconds=SAMPLED, rate=1.0))
 
     def files(self, what: str, folder: Path) -> dict[Path, bytes]:
         """Return the frames of a video, or the layers, as the PNG files in a folder.

@@ -490,7 +490,7 @@ def coarse_edit(
     """Return the part of the edit for a refiner. Raises RefineError where nothing was edited."""
     bare = replace(document, refined=None)
     result = composite(bare, puppets, progress, keeps_weights=True)
-    return refinement.cut_edit(document.photo.pixels, result)
+    return refinement.cut_edit(document.photo.picture, result)
 
 
 def with_refinement(

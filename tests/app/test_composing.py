@@ -242,6 +242,16 @@ def test_a_shadow_follows_what_is_said_of_the_ground(editor: Editor, ball: Docum
     assert again.bounds == afresh.bounds != flat.bounds
 
 
+def test_a_shadow_follows_the_opacity_of_its_object(editor: Editor, ball: Document) -> None:
+    document = edits.set_placement(ball, 0, Placement(move=(-20.0, 0.0)))
+    document = edits.set_shadow(document, 0, Shadow(strength=0.8))
+    whole = shade_of(editor, document)
+    half = shade_of(editor, edits.set_finish(document, 0, Finish(0.5)))
+    assert whole is not None and half is not None
+    assert 0 < half.alpha.max() < 0.7 * whole.alpha.max()
+    assert shade_of(editor, edits.set_finish(document, 0, Finish(0.0))) is None
+
+
 def test_what_lies_under_clear_ground_is_no_shadow_and_no_background(
     editor: Editor, ball: Document
 ) -> None:

@@ -563,3 +563,15 @@ def test_the_alpha_of_a_clip_at_rest_is_the_photos_as_small_as_its_frames():
     assert small.shape == (height // 2, width // 2, 4)
     assert set(np.unique(small[..., 3])) == {0, 255}
     assert next(frames(edited(), clip)).shape[2] == 3
+
+
+@pytest.mark.parametrize(
+    ("size", "ending"),
+    [((1, 1), ".mp4"), ((64, 1), ".webm"), ((1, 64), ".mp4"), ((20000, 12), ".webp")],
+)
+def test_a_size_that_a_format_does_not_have_is_said(size, ending):
+    width, height = size
+    sent = [np.full((height, width, 3), 90, np.uint8)] * 2
+    with pytest.raises(VideoError, match=rf"of {width} x {height} px .* {ending}, .* \d+ to \d+"):
+        encode_video(iter(sent), 10.0, ending)
+    assert encode_video(iter(sent), 10.0, ".gif")

@@ -75,7 +75,7 @@ class Lights:
             if item.is_moved and item.is_visible and item.shadow.strength > 0:
                 caster = self._casters(
                     lambda own=own: lighting.caster(own.item, own.draft, horizon, is_sketch=True),
-                    own.draft, item.shadow, item.seen_from, horizon, lighting,
+                    own.draft, item.shadow, item.finish.opacity, item.seen_from, horizon, lighting,
                 )  # fmt: skip
                 if caster is not None:
                     found.append((own, caster))
@@ -104,7 +104,7 @@ class Lights:
         around = document.plate, document.horizon, document.depth
         sources = (own.posed, item.shadow, item.seen_from, *shares, item.finish, *around)
         for o in others:
-            sources += o.posed, o.item.shadow, o.item.seen_from
+            sources += o.posed, o.item.shadow, o.item.finish.opacity, o.item.seen_from
         kept, now = self._kept.get(k), time.monotonic()
         if kept is None or not same(kept.sources, sources):
             lit = self._work(document, own, is_hurried, near)()

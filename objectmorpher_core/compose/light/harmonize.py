@@ -28,6 +28,8 @@ import numpy as np
 from ...base.arrays import F32, F64, U8, unit_pixels
 from ...base.masks import dilated
 from ...document.model import Document
+from ...document.transparency import is_seen
+from ..plate.plate import plate_alpha
 from ..shadow.shadow import GAMMA
 from ..silhouette import Silhouette, sampled
 
@@ -51,11 +53,12 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)  # of encoded values
 DARK = 1e-3  # linear light below which a ratio says nothing
 COVERED = 0.3  # of a small pixel
+SHOWN = 0.5  # of a small pixel, from which the photo is not clear there
 LEAST_PIXELS = 4  # of the small picture
 
 
 def light_map(document: Document) -> F32:
-    """(h, w, 3) the background, small, in linear light.
+    """(h, w, 3) the background, small, in linear light; nan where the photo is clear.
 
     Of a large photo every so many pixels are looked at.
     """
@@ -70,8 +73,20 @@ def light_map(document: Document) -> F32:
         np.copyto(part, plate.pixels[every], where=hole[..., None])
     shrink = min(MAP / max(pixels.shape[:2]), 1.0)
     size = (max(round(pixels.shape[1] * shrink), 1), max(round(pixels.shape[0] * shrink), 1))
-    small = cv2.resize(unit_pixels(pixels), size, interpolation=cv2.INTER_AREA)
+    light = unit_pixels(pixels)
+    if (alpha := plate_alpha(document)) is None:
+        small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+    else:
+        small = _shrunk(light, is_seen(alpha[::step, ::step]).astype(np.float32), size)
     return np.asarray(small ** np.float32(GAMMA), np.float32)
+
+
+def _shrunk(light: F32, seen: F32, size: tuple[int, int]) -> F32:
+    """The means (h, w, 3) of what is `seen` (H, W) of a picture; nan where little of it is."""
+    whole = cv2.resize(light * seen[..., None], size, interpolation=cv2.INTER_AREA)
+    share = cv2.resize(seen, size, interpolation=cv2.INTER_AREA)[..., None]
+    small = np.where(share > SHOWN, whole / np.maximum(share, SHOWN), np.nan)
+    return np.asarray(small, np.float32)
 
 
 def light_gain(light: F32, width: int, before: Silhouette, now: Silhouette) -> Gain:
@@ -190,7 +205,7 @@ class _Around:
 
 
 def _around(light: F32, width: int, shape: Silhouette) -> _Around | None:
-    """None where that is not in the photo."""
+    """None where that is not in the photo, or clear."""
     pitch = width / light.shape[1]  # photo px per px of the map
     corner = (shape.left / pitch, shape.top / pitch)
     box = (0, 0, light.shape[1], light.shape[0])
@@ -198,7 +213,7 @@ def _around(light: F32, width: int, shape: Silhouette) -> _Around | None:
     if not covered.any():
         return None
     reach = max(round(RING * max(shape.alpha.shape) * shape.pitch / pitch), 1)
-    around = dilated(covered, reach)
+    around = dilated(covered, reach) & ~np.isnan(light[..., 0])
     places = np.argwhere(around)[:, ::-1].astype(np.float64)
     colours = light[around].astype(np.float64)
     mean = _mean(colours)

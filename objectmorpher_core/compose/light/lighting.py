@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -20,6 +20,7 @@ from ...document.bounds import NORMAL
 from ...document.model import Document, EditObject, LiftedObject, Matte
 from ...document.placement import down_at
 from ...document.settings import AS_IN_THE_PHOTO, Shadow
+from ...document.transparency import continued, is_seen
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, TextureSource
 from ..blend import Box
@@ -136,13 +137,21 @@ class Lighting:
 
     @cached_property
     def noise(self) -> Noise | None:
-        """The photo's grain."""
-        return find_noise(self._document.photo.pixels)
+        """The photo's grain, where it is not clear."""
+        picture = self._document.photo.picture
+        if picture.alpha is None:
+            return find_noise(picture.pixels)
+        # What touches black, which has no noise, is not asked.
+        return find_noise(np.where(is_seen(picture.alpha)[..., None], picture.pixels, 0))
 
     @cached_property
     def focus(self) -> PhotoDefocus:
-        """Return the blur of the photo."""
-        return PhotoDefocus(self._document.photo.pixels, plate_cover(self._document))
+        """Return the blur of the photo, where it is not clear."""
+        picture, covered = self._document.photo.picture, plate_cover(self._document)
+        if picture.alpha is None:
+            return PhotoDefocus(picture.pixels, covered)
+        seen = is_seen(picture.alpha)
+        return PhotoDefocus(continued(picture, np.zeros_like(seen)), covered | ~seen)
 
     @cached_property
     def _depth(self) -> F32 | None:
@@ -218,15 +227,20 @@ class Lighting:
     def caster(
         self, item: EditObject, splats: PosedSplats, horizon: float | None, is_sketch: bool = False
     ) -> Caster | None:
-        """Return the shadow that a moved object throws; None where it throws none."""
-        if not item.is_moved or not item.is_visible or item.shadow.strength <= 0:
+        """Return the shadow that a moved object throws; None where it throws none.
+
+        What is half transparent takes half of the light.
+        """
+        strength = item.shadow.strength * item.finish.opacity
+        if not item.is_moved or not item.is_visible or strength <= 0:
             return None
+        shadow = replace(item.shadow, strength=strength)
         camera = self._document.photo.camera
         most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
         standing = stand(splats, camera, horizon, item.grounded_shadow, most)
         if standing is None:
             return None
-        return Caster(item.shadow, standing, horizon, cells, self._depth)
+        return Caster(shadow, standing, horizon, cells, self._depth)
 
     def _gain(self, item: EditObject, splats: PosedSplats, rest: Callable[[], PosedSplats]) -> Gain:
         """The factors of an object's colours in the light of where it is now."""

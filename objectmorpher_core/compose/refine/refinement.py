@@ -21,7 +21,8 @@ from ...base.arrays import F32, F64, RGB, U8, Pixels, pixels_from_unit, unit_pix
 from ...base.masks import box_of
 from ...base.progress import Progress, part
 from ...document.settings import Refined
-from ...pictures.image import to_u8
+from ...document.transparency import continued
+from ...pictures.image import Picture, to_u8
 from ..blend import Box
 from ..composite import Composite
 from . import RefineError, Refiner
@@ -247,21 +248,30 @@ class Checked:
     drift: Drift  # that was taken out
 
 
-def cut_edit(photo: Pixels, result: Composite) -> CoarseEdit:
-    """Return the part of `result` that is refined: a composite of `photo` (H, W, 3), unrefined.
+def cut_edit(photo: Picture, result: Composite) -> CoarseEdit:
+    """Return the part of `result` that is refined: a composite of `photo`, unrefined.
 
+    Colours under clear ground are not shown to a refiner: those of what is seen go on there.
     Raises RefineError where nothing was edited.
     """
     weights = result.weights
     if result.box is None or weights is None or not (weights > 0).any():
         raise RefineError("nothing was edited, there is nothing to refine")
-    height, width = photo.shape[:2]
+    height, width = photo.pixels.shape[:2]
     x0, y0, x1, y1 = crop_box(result.box, weights, (width, height))
     alpha = np.zeros((height, width), np.float32)
     left, top, right, bottom = result.box
     alpha[top:bottom, left:right] = weights
-    coarse = to_u8(result.pixels[y0:y1, x0:x1])
-    return CoarseEdit(x0, y0, photo[y0:y1, x0:x1], coarse, alpha[y0:y1, x0:x1])
+    inner = np.s_[y0:y1, x0:x1]
+    was, now = _seen_part(photo, inner), _seen_part(result.picture(photo), inner)
+    return CoarseEdit(x0, y0, was, to_u8(now), alpha[inner])
+
+
+def _seen_part(picture: Picture, inner: tuple[slice, slice]) -> Pixels:
+    """A part (h, w, 3) of a picture, in which the colours of what is seen go on."""
+    alpha = None if picture.alpha is None else picture.alpha[inner]
+    shown = Picture(picture.pixels[inner], alpha)
+    return continued(shown, np.zeros(shown.pixels.shape[:2], bool))
 
 
 def refine(

@@ -25,7 +25,7 @@ from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import ground_normal
-from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.settings import Finish, Shadow
 from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
 from tests.outlines import silhouette, standing, upright
@@ -52,6 +52,24 @@ def cast(shadow: Shadow, standing: StandingObject) -> Shade | None:
 
 def _moved(name: str = "ellipse", placement: Placement = MOVE) -> Document:
     return edits.set_placement(shapes.scene(name).document(), 0, placement)
+
+
+def test_a_shadow_fades_with_its_object():
+    """An invisible object has none, and a half transparent one takes half of the light."""
+
+    def finished(opacity: float, strength: float) -> Document:
+        document = edits.set_finish(_moved(), 0, Finish(opacity))
+        return edits.set_shadow(document, 0, replace(DARK, strength=strength))
+
+    gone, bare = (composite(finished(0.0, strength)) for strength in (0.9, 0.0))
+    assert np.array_equal(gone.pixels, bare.pixels)
+    assert np.array_equal(gone.footprint, bare.footprint)
+    (half,), (weak,) = (
+        [thing.look.shade for thing in composite(finished(*told)).stack]
+        for told in ((0.5, 0.8), (1.0, 0.4))
+    )
+    assert half is not None and weak is not None
+    assert np.array_equal(half.alpha, weak.alpha)
 
 
 def test_no_strength_is_no_shadow():

@@ -19,8 +19,9 @@ from objectmorpher_core.compose.order import holes
 from objectmorpher_core.compose.plate.plate import plate_cover, plate_of_holes
 from objectmorpher_core.compose.plate.repair import fill_patch, margin_of, patch_of, with_patch
 from objectmorpher_core.document import edits
+from objectmorpher_core.document.bounds import MODES
 from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
-from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.document.settings import Finish, Shadow
 from objectmorpher_core.document.transparency import (
     continued,
     on_checker,
@@ -35,6 +36,7 @@ from objectmorpher_core.pipeline import lift_mask, make_plate, replay
 from objectmorpher_core.scripting.animation import Clip, frames
 from objectmorpher_core.scripting.outputs import Export, output_picture
 from objectmorpher_core.session.file import decode_session, encode_session
+from tests.core.compose.stacked import stacked
 from tests.photos import photo
 from tests.tree import quick
 
@@ -300,16 +302,33 @@ def test_layers_look_like_the_picture(ending: str, tmp_path: Path):
     assert result.alpha is not None
     merged, pile = Export(document).layers(lambda *_: None)
     assert np.array_equal(merged.alpha, result.alpha)
-    picture = pile[0].pixels.astype(np.float64)
-    for layer in pile[1:]:
-        x0, y0, x1, y1 = layer.box
-        share = layer.pixels[..., 3:] / 255
-        part = picture[y0:y1, x0:x1]
-        part += share * (layer.pixels[..., :3] - part)
+    picture = stacked(pile)
     for ground in GROUNDS:
         off = _laid(picture.round().astype(np.uint8), result.alpha, ground)
         assert np.abs(off - _laid(result.pixels, result.alpha, ground)).max() <= 3
     assert Export(document).encode("layers", tmp_path / f"made{ending}")
+
+
+@cache
+def _half_clear() -> Document:
+    """The same on ground of which a third is opaque, a third half transparent, a third clear."""
+    _, mask = _cut_out("hard")
+    ground = np.repeat(np.array([255, 128, 0], np.uint8), SIZE[0] // 3)
+    alpha = np.where(mask, 255, ground).astype(np.uint8)
+    pixels = cv2.resize(photo("coffee"), SIZE, interpolation=cv2.INTER_AREA)
+    return _lifted(Picture(pixels, alpha), mask)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("move", [(-40, -10), (20, -18), (95, 0)])
+def test_mixed_layers_look_like_the_picture_over_ground_that_is_not_opaque(mode, move):
+    """Over nothing an object has its own colours, in whatever way it is mixed; so in the pile."""
+    document = edits.set_finish(_moved(_half_clear(), move), 0, Finish(blend_mode=mode))
+    merged, pile = Export(document).layers(lambda *_: None)
+    assert merged.alpha is not None
+    off = np.abs(stacked(pile) - merged.pixels).max(-1) * (merged.alpha / 255)
+    assert off.max() <= 3
+    assert mode in {layer.mode for layer in pile}
 
 
 def test_in_a_film_the_alpha_moves_too(tmp_path: Path):

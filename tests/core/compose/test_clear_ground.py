@@ -1,0 +1,140 @@
+"""Colours that a photo has where it is clear: no edit heeds them, and none changes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from objectmorpher_core.base.arrays import Mask, Pixels
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose.light.lighting import Lighting
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.compose.refine import refinement
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
+from objectmorpher_core.document.transparency import continued
+from objectmorpher_core.pictures.image import Picture, encode_picture
+from objectmorpher_core.pipeline import lift_mask, make_plate
+from objectmorpher_core.scripting.runner import coarse_edit
+from tests.photos import photo
+
+SIZE = 240, 160  # px
+SHAPE = LiftSettings(8000, trust=0)  # what it is does not matter here: no network tells it
+RNG = np.random.default_rng(3)
+SMALL = cv2.resize(photo("coffee"), SIZE, interpolation=cv2.INTER_AREA)
+HIDDEN = {
+    "noise": RNG.integers(60, 200, SMALL.shape).astype(np.uint8),
+    "white": np.full_like(SMALL, 250),
+    "black": np.full_like(SMALL, 4),
+    "a photo": cv2.resize(photo("chelsea"), SIZE, interpolation=cv2.INTER_AREA),
+}
+ITEM = cv2.ellipse(np.zeros(SIZE[::-1], np.uint8), (108, 93), (48, 42), 0, 0, 360, 1, -1) > 0
+SHOWN = {  # where the photo is not clear
+    "a half": (np.arange(SIZE[0]) < 165) | ITEM,
+    "the thing alone": cv2.dilate(ITEM.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0,
+}
+everywhere = pytest.mark.parametrize("where", SHOWN)
+
+
+@cache
+def _smooth() -> Pixels:
+    """Whose light is told well; where the photo has noise, that of its other half is in doubt."""
+    return cv2.GaussianBlur(SMALL, (0, 0), 20)
+
+
+def _picture(ground: Pixels, there: Mask, hidden: str) -> Picture:
+    pixels = np.where(there[..., None], ground, HIDDEN[hidden])
+    return Picture(pixels, np.where(there, 255, 0).astype(np.uint8))
+
+
+def _lifted(picture: Picture) -> Document:
+    camera = Camera.from_fov(*SIZE, 2.0)
+    document = Document(Photo(picture, camera, encode_picture(picture, ".png"), "cut.png"))
+    document = edits.set_mask(edits.add_object(document), 0, ITEM, Prompt())
+    selection = document.objects[0].selection
+    assert selection is not None
+    made = lift_mask(picture.pixels, camera, selection, "relief", SHAPE)
+    document = edits.set_lifted(document, 0, *made)
+    covered = plate_cover(document)
+    return edits.set_plate(document, make_plate(continued(picture, covered), covered, "telea"))
+
+
+@cache
+def _alike(where: str, is_smooth: bool = False) -> tuple[Document, ...]:
+    """The same edit of photos that look alike and hide other colours."""
+    ground, there = _smooth() if is_smooth else SMALL, np.broadcast_to(SHOWN[where], ITEM.shape)
+    pictures = [_picture(ground, there, hidden) for hidden in HIDDEN]
+    first = edits.set_placement(_lifted(pictures[0]), 0, Placement(move=(90.0, 20.0), scale=0.7))
+    return tuple(replace(first, photo=replace(first.photo, picture=own)) for own in pictures)
+
+
+def _seen(document: Document) -> np.ndarray:
+    """(H, W, 4) what an edit looks like."""
+    result = composite(document)
+    assert result.alpha is not None
+    return np.dstack([np.where(result.alpha[..., None] > 0, result.pixels, 0), result.alpha])
+
+
+@everywhere
+@pytest.mark.parametrize("is_smooth", [False, True], ids=["as it is", "smooth"])
+@pytest.mark.parametrize("share", ["harmony", "grain", "defocus", "relight"])
+def test_what_is_hidden_changes_nothing_that_is_seen(where, is_smooth, share):
+    first, *others = (edits.set_share(d, 0, share, 1.0) for d in _alike(where, is_smooth))
+    looks = _seen(first)
+    for other in others:
+        assert np.array_equal(_seen(other), looks)
+
+
+def test_the_focus_is_that_of_what_is_seen():
+    """Around the ground beside the thing, and of the thing with its outline."""
+    found = [Lighting(document).focus for document in _alike("a half", is_smooth=True)]
+    beside = [[focus.beside(row, 30.0, 100.0) for row in range(8, 160, 16)] for focus in found]
+    assert all(each == beside[0] for each in beside)
+    own = [Lighting(d).focus.of_object(d.objects[0].matte) for d in _alike("the thing alone")]
+    assert len(set(own)) == 1
+
+
+def test_around_a_thing_on_clear_ground_nothing_says_what_light_it_has():
+    lights = [Lighting(document).light for document in _alike("the thing alone", is_smooth=True)]
+    assert all(np.isnan(light).mean() > 0.6 for light in lights)
+
+
+class Paling:
+    """Shows what it is shown, with its colours a little nearer to grey."""
+
+    name = "paling"
+
+    def missing(self) -> str | None:
+        """Return None: it runs everywhere."""
+        return None
+
+    def refine(self, original, coarse, object_alpha, progress, seed=0):
+        """Return `coarse`, paler where the edit is."""
+        paler = coarse + 0.3 * object_alpha[..., None] * (128 - coarse.astype(np.float32))
+        return np.rint(paler).astype(np.uint8)
+
+
+@everywhere
+def test_a_refiner_sees_nothing_that_is_hidden(where):
+    first, *others = (coarse_edit(document) for document in _alike(where))
+    for other in others:
+        assert np.array_equal(other.coarse, first.coarse)
+        assert np.array_equal(other.pixels, first.pixels)
+
+
+@everywhere
+def test_a_refined_picture_keeps_the_bytes_that_are_hidden(where):
+    """Only what is seen is refined."""
+    for document in _alike(where):
+        made = refinement.refine(coarse_edit(document), Paling(), silent, 0, 1.0)
+        picture, result = document.photo.picture, composite(edits.set_refined(document, made))
+        assert picture.alpha is not None and result.alpha is not None
+        is_hidden = (picture.alpha == 0) & (result.alpha == 0)
+        assert np.array_equal(result.pixels[is_hidden], picture.pixels[is_hidden])
+        assert result.shares.from_refiner > 0.3, "and all the rest is"
