@@ -42,6 +42,7 @@ GOES_ON, SURE = 0.45, 0.15  # x that level: a hair goes on; share of it that is 
 APART, UNLIKE = 3.0, 1.0  # px to both its sides, which differ by less than this x its contrast
 SMALLEST = 120.0  # px, root of the area of an object whose hair is thick enough to be seen
 SHORTEST, GAP, WIDTH = 9, 2, 1  # px; to both sides of the middle
+TUFT = 5  # px: between two hairs so near there may be more
 FULL, WITHIN = 0.007, 5.0  # share of other lines within so many margins, at most
 RAGGED = 0.05  # mean of that over an outline (`hair_of`), below which nothing beside it is hair
 EVIDENCE = 0.25  # x the root of the object's area: that mean times the px of hair, at least
@@ -95,7 +96,8 @@ def _hair(light: F32, hides: Mask, margin: float) -> Mask:
     keeps &= (length >= SHORTEST) & (extent >= SHORTEST)
     keeps[0] = False
     line &= keeps[labels] & (areas[nearest] > SMALLEST**2)
-    return np.asarray(cv2.dilate(line.astype(np.uint8), disc(WIDTH)) > 0)
+    hair = cv2.dilate(line.astype(np.uint8), disc(WIDTH))
+    return np.asarray(cv2.morphologyEx(hair, cv2.MORPH_CLOSE, disc(TUFT)) > 0)
 
 
 def _lines(light: F32, where: Mask, usual: Mask, sigma: float) -> tuple[Mask, Mask]:
@@ -173,7 +175,8 @@ def _around(image: np.ndarray, sigma: float) -> F32:
 
 MARGIN = 2.5  # x the matte's band: a hundredth of the photo's diagonal
 CONTEXT = 8  # x margin, seen around it
-BEHIND = (0.5, 1.2, 2.5)  # x margin: so far around, what is behind is averaged, the nearest first
+BEHIND = (0.5, 1.2, 2.5)  # x margin: so far around, what is behind is averaged
+LEAST_BARE = 1e-3  # share of what is around that must be seen bare
 MORE = 1.25  # x the least that it can cover
 FAINTEST = 0.02  # alpha that is kept
 TILE = 1536  # px: what is worked on at a time of a large picture, at 60 bytes a px
@@ -234,24 +237,32 @@ def _unmixed(
     part = np.s_[y0:y1, x0:x1]
     rgb, there = unit_pixels(pixels[part]), loose[part]
     is_bare = ~covered[part] & (cv2.dilate(there.astype(np.uint8), disc(2)) == 0)
-    bare, total = is_bare.astype(np.float32), np.full(there.shape, 1e-9, np.float32)
-    behind = np.zeros_like(rgb)
-    shown = rgb * bare[..., None]
-    for n, size in enumerate(BEHIND):
-        side, share = 2 * int(np.ceil(size * margin)) + 1, np.float32(100.0**-n)
-        total += share * cv2.blur(bare, (side, side))
-        behind += share * cv2.blur(shown, (side, side))
-    seen, around = rgb[there], behind[there] / total[there][:, None]
-    change = seen - around
-    room = np.maximum(np.where(change > 0, 1 - around, around), 1e-3)
-    share = (MORE * (np.abs(change) / room).max(-1)).clip(0, 1)
+    bare, shown = is_bare.astype(np.float32), rgb * is_bare[..., None]
+    seen = rgb[there]
+    around, share = seen.copy(), np.full(len(seen), np.inf, np.float32)
+    for size in BEHIND:
+        side = 2 * int(np.ceil(size * margin)) + 1
+        count = cv2.blur(bare, (side, side))[there]
+        mean = cv2.blur(shown, (side, side))[there] / np.maximum(count, 1e-9)[:, None]
+        cover = np.where(count > LEAST_BARE, _least_cover(seen, mean), np.inf)
+        around = np.where((cover < share)[:, None], mean, around)
+        share = np.minimum(share, cover)
+    share = np.where(np.isfinite(share), np.minimum(MORE * share, 1), 0)
     share = np.where(share >= FAINTEST, share, 0).astype(np.float32)
+    change = seen - around
     alpha, colours = np.zeros(there.shape, np.float32), np.zeros_like(rgb)
     alpha[there] = share
     colours[there] = (around + change / np.maximum(share, FAINTEST)[:, None]).clip(0, 1)
     left, top, right, bottom = own
     inner = np.s_[top - y0 : bottom - y0, left - x0 : right - x0]
     return alpha[inner], colours[inner]
+
+
+def _least_cover(seen: F32, behind: F32) -> F32:
+    """(N,) the least share that any colour must have to make of `behind` what is `seen` (N, 3)."""
+    change = seen - behind
+    room = np.maximum(np.where(change > 0, 1 - behind, behind), 1e-3)
+    return np.asarray((np.abs(change) / room).max(-1), np.float32)
 
 
 UNEVEN = 0.3  # x what is usual between two Gaussians, by which these are off a grid

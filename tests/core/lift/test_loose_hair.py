@@ -124,6 +124,38 @@ def test_only_what_ends_in_hair_has_hair_beside_it():
     assert (alpha[middle & (fur <= 0)] > 0.2).mean() > 0.8
 
 
+def test_between_dark_hairs_a_bright_wall_is_no_bright_hair_and_in_a_tuft_none_is_missing():
+    wall, fur = np.full((HEIGHT, WIDTH, 3), 200, np.float32), _fur()
+    matte = Matte(0, 0, fur, np.full((*fur.shape, 3), np.float32(60 / 255)))
+    brighter, found = [], []
+    for seed in range(6):
+        cover = _tuft(np.random.default_rng(seed))
+        hairy = with_loose_hair(_mixed(wall, (cover, 40), (fur, 60)), matte)
+        alpha, tone = (
+            crop(part, hairy.box, (0, 0, WIDTH, HEIGHT))
+            for part in (hairy.alpha, hairy.foreground.mean(-1))
+        )
+        redrawn = 200 + alpha * (255 * tone - 200)
+        brighter.append(redrawn[fur <= 0].max() - 200)
+        there = (fur <= 0) & (cover > 0.5) & (AWAY < RADIUS + 30)
+        found.append((redrawn[there] < 120).mean())
+    assert np.mean(brighter) < 7  # levels
+    assert np.mean(found) > 0.75
+
+
+def _tuft(rng: np.random.Generator, count: int = 8) -> F32:
+    """(h, w) how much of each pixel hairs side by side cover above the disc, and others below."""
+    cover = np.zeros((4 * HEIGHT, 4 * WIDTH), np.uint8)
+    for angle in rng.normal(-0.9, 0.08, count):
+        steps = np.linspace(0, rng.uniform(25, 45), 20)
+        angles = angle + 0.004 * steps
+        lines = np.stack([240 + (78 + steps) * np.cos(angles), 190 + (78 + steps) * np.sin(angles)])
+        cv2.polylines(cover, [np.rint(4 * lines.T).astype(np.int32)], False, 255, 4, cv2.LINE_AA)
+    small = cv2.resize(cover, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA) / np.float32(255)
+    below = np.indices((HEIGHT, WIDTH))[0] > 240
+    return np.asarray(np.maximum(small, _hairs(0)[0] * below), np.float32)
+
+
 def _furry() -> tuple[np.ndarray, Matte]:
     """A photo (h, w, 3) of fur with loose hairs on a blurred ground, and its cut-out."""
     cover, _ = _hairs(0)
