@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from ...base.arrays import F32, I32, Pixels
@@ -24,6 +25,8 @@ ANCHOR = 0.01  # weight of a pixel that is nothing but object, or nothing but ba
 SMALL = 64  # px: up to this size colours still have far to go
 ROUNDS = (12, 3)  # small sizes, others
 TILE = 256  # px, even
+BLOCK = 16  # px: F is like something that is seen in a block or in those around it, ...
+BEYOND = np.float32(0.05)  # ... within so much, sRGB
 AROUND = 6  # px, even: no fewer than the rounds, so that tiles leave no trace
 
 Window = tuple[slice, slice]
@@ -42,6 +45,7 @@ class Unmixed:
 def unmixed(pixels: Pixels, alpha: F32) -> Unmixed:
     """Unmix a photo's crop (h, w, 3) in which the object covers `alpha` (h, w)."""
     half = _half_colours(_Size(halved_pixels(pixels), halved(alpha)))
+    least, most = _extremes(pixels)
     foreground = np.empty((*alpha.shape, 3), np.float32)
     mixed: dict[int, tuple[np.ndarray, np.ndarray, F32]] = {}
 
@@ -50,7 +54,11 @@ def unmixed(pixels: Pixels, alpha: F32) -> Unmixed:
         if behind is not None:
             share = alpha[window]
             rows, columns = places = np.nonzero((share > 0) & (share < 1))
-            own[places], seen = exact(rgb[places], share[places], own[places], behind[places])
+            block = tuple((p + s.start) // BLOCK for p, s in zip(places, window, strict=True))
+            limits = least[block], most[block]
+            own[places], seen = exact(
+                rgb[places], share[places], own[places], behind[places], limits
+            )
             mixed[k] = rows + window[0].start, columns + window[1].start, seen
         foreground[window] = own
 
@@ -59,6 +67,21 @@ def unmixed(pixels: Pixels, alpha: F32) -> Unmixed:
     parts = [(nowhere, nowhere, np.empty((0, 3), np.float32)), *(mixed[k] for k in sorted(mixed))]
     rows, columns, behind = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Unmixed(foreground, rows.astype(np.int32), columns.astype(np.int32), behind)
+
+
+def _extremes(pixels: Pixels) -> tuple[F32, F32]:
+    """(h / BLOCK, w / BLOCK, 3) least and most of a photo's crop about each block of it, in [0, 1].
+
+    A colour beyond is in nothing that is seen there.
+    """
+    rows, columns = (range(0, n, BLOCK) for n in pixels.shape[:2])
+    parts = (np.minimum, np.maximum), (cv2.erode, cv2.dilate)
+    around, found = np.ones((3, 3), np.uint8), []
+    for reduce, spread in zip(*parts, strict=True):
+        blocks = reduce.reduceat(reduce.reduceat(pixels, rows, axis=0), columns, axis=1)
+        found.append(unit(np.ascontiguousarray(spread(blocks, around))))
+    least, most = found
+    return np.maximum(least - BEYOND, 0), np.minimum(most + BEYOND, 1)
 
 
 def _half_colours(size: _Size) -> tuple[F32, F32]:
@@ -299,8 +322,13 @@ def _relax(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def exact(rgb: F32, alpha: F32, fore: F32, back: F32) -> tuple[F32, F32]:
-    """F and B (N, 3) in [0, 1], as near as can be to those given, that mix to `rgb` (N, 3)."""
+def exact(rgb: F32, alpha: F32, fore: F32, back: F32, limits: tuple[F32, F32]) -> tuple[F32, F32]:
+    """F and B (N, 3) in [0, 1], as near as can be to those given, that mix to `rgb` (N, 3).
+
+    F is within the least and the most (N, 3) of its `limits`, unless B in [0, 1] cannot make up
+    for that.
+    """
+    least, most = limits
     one, other = np.empty(rgb.shape, np.float32), np.empty(rgb.shape, np.float32)
     for n in range(len(rgb)):
         a = float(alpha[n])
@@ -308,7 +336,7 @@ def exact(rgb: F32, alpha: F32, fore: F32, back: F32) -> tuple[F32, F32]:
         share = 1 / (a * a + b * b)
         for c in range(3):
             rest = (rgb[n, c] - a * fore[n, c] - b * back[n, c]) * share
-            own = min(max(fore[n, c] + a * rest, 0.0), 1.0)
+            own = min(max(fore[n, c] + a * rest, least[n, c]), most[n, c])
             behind = min(max((rgb[n, c] - a * own) / b, 0.0), 1.0)
             # Where B came to its limit F gives way, and finds room.
             one[n, c] = min(max((rgb[n, c] - b * behind) / a, 0.0), 1.0)

@@ -7,6 +7,7 @@ import tracemalloc
 import cv2
 import numpy as np
 import pytest
+from skimage import data
 
 from objectmorpher_core.base.arrays import crop, pixels_from_unit, unit_pixels
 from objectmorpher_core.base.masks import dilated, disc
@@ -26,7 +27,7 @@ from objectmorpher_core.segment.matting.matte import (
     veil,
 )
 from objectmorpher_core.segment.matting.straying import strays
-from objectmorpher_core.segment.matting.unmix import exact, unmixed
+from objectmorpher_core.segment.matting.unmix import BEYOND, BLOCK, exact, unmixed
 from tests import shapes
 from tests.tree import over
 
@@ -432,9 +433,27 @@ def test_a_pixel_mixes_exactly_whatever_was_guessed():
     alpha = np.concatenate([random.random(4000), 10.0 ** -random.uniform(1, 6, 1000)])
     alpha = np.clip(alpha, 1e-6, 1 - 1e-6).astype(np.float32)
     share = alpha[:, None]
-    for fore, back in (exact(rgb, alpha, own, behind), unveiled(rgb, alpha, own)):
+    least, most = np.sort(random.random((2, 5000, 3)), axis=0).astype(np.float32)
+    limited = exact(rgb, alpha, own, behind, (least, most))
+    for fore, back in (limited, unveiled(rgb, alpha, own)):
         assert np.abs(share * fore + (1 - share) * back - rgb).max() < 1e-6
         assert min(fore.min(), back.min()) >= 0 and max(fore.max(), back.max()) <= 1
+    fore, back = limited
+    beyond = np.maximum(least - fore, fore - most)
+    assert (share * beyond)[(back > 0) & (back < 1)].max() < 1e-6
+
+
+def test_an_object_has_no_colour_that_is_not_seen_about_it():
+    """Of a stripe that alpha takes for half an object the other half was black, or cyan."""
+    photo = data.astronaut()[:200, :200]
+    colours = unmixed(photo, np.full(photo.shape[:2], 0.4, np.float32))
+    size = 3 * 2 * BLOCK - 1  # as much as may be in a block and those around it
+    least, most = (way(photo, np.ones((size, size), np.uint8)) for way in (cv2.erode, cv2.dilate))
+    seen = 255 * colours.background
+    free = ((seen > 0.01) & (seen < 254.99)).reshape(photo.shape)
+    fore, slack = 255 * colours.foreground, 255 * BEYOND + 0.1
+    assert free.mean() > 0.9
+    assert (fore >= least - slack)[free].all() and (fore <= most + slack)[free].all()
 
 
 # ---- what is seen through ------------------------------------------------------------------------
