@@ -46,6 +46,9 @@ SOFT = {  # u8 alpha, which fades
 }
 EDITS = {
     "moved": lambda edit: edit.move(90.0, 20.0).scale(0.7),
+    "turned": lambda edit: edit.turn(yaw=25.0),
+    "rolled": lambda edit: edit.turn(pitch=5.0, roll=12.0),
+    "dragged": lambda edit: edit.pin(108, 125).drag((108, 70), (150, 50)),
 }
 everywhere = pytest.mark.parametrize("where", SHOWN)
 
