@@ -39,6 +39,7 @@ from .document.model import (
     Prompt,
 )
 from .document.settings import Hint
+from .document.transparency import colours_of, seen
 from .lift.beyond_frame import cut_out_beyond
 from .lift.loose_hair import with_hair_along, with_loose_hair
 from .lift.registration.imported import ImportTarget, Source, place_import, register_file
@@ -297,7 +298,7 @@ def _carried_out(
             document, notes = behind.document, (*notes, *behind.notes)
     has_shadow = any(item.shadow.strength > 0 for item in document.objects)
     if has_shadow and document.depth is None and not script.no_depth:
-        document = edits.set_depth(document, look_at_all(document.photo.pixels))
+        document = edits.set_depth(document, look_at_all(colours_of(document.photo.picture)))
     for k, wanted in enumerate(wishes):
         if wanted.script.refine == "harmonise":
             document = edits.harmonised(document, k).with_backend("refine", "harmonise")
@@ -437,13 +438,13 @@ class _Run:
         """Object `k` stays in front."""
         mask = self.document.objects[k].selection
         assert mask is not None, "it was chosen"
-        matte = cut_front(self.document.photo.pixels, mask)
+        matte = cut_front(colours_of(self.document.photo.picture), mask)
         self.document = edits.keep_in_front(self.document, k, matte)
 
     def _reading(self, backend: str, progress: Progress) -> Reading:
         if backend not in self._readings:
-            pixels = self.document.photo.pixels
-            self._readings[backend] = read_photo(pixels, segment.load(backend), progress)
+            shown = seen(self.document.photo)
+            self._readings[backend] = read_photo(shown, segment.load(backend), progress)
         return self._readings[backend]
 
 
@@ -467,13 +468,13 @@ def _lift(
         if script.more_views:
             return _lift_all_round(document, k, script, settings, progress)
         made = lift_mask(
-            photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed, None,
-            use_matte,
+            colours_of(photo.picture), photo.camera, mask, script.lift, settings, progress,
+            script.seed, None, use_matte,
         )  # fmt: skip
         return edits.set_lifted(document, k, *made, settings)
     is_alone = all(item.lifted is None for i, item in enumerate(document.objects) if i != k)
     is_free = is_alone and script.fov is None and not photo.picture.focal_35mm
-    scene = ImportTarget(photo.pixels, photo.camera, mask, is_free)
+    scene = ImportTarget(colours_of(photo.picture), photo.camera, mask, is_free)
     source = Source(Path(script.splats), script.gaussians or COUNT, script.flip)
     found = register_file(source, scene, part(progress, 0.0, 0.8), script.seed)
     best = found.registration.best
@@ -498,9 +499,9 @@ def other_photo(
     with naming(path):
         opened = open_photo(read_input(path), path.name, fov, seed).photo
     prompt = Prompt((Click(*at),)) if at else Prompt(is_subject=True)
-    reading = read_photo(opened.pixels, segment.load(backend), part(progress, 0.0, 0.7))
+    reading = read_photo(seen(opened), segment.load(backend), part(progress, 0.0, 0.7))
     found = reading.segment(prompt, part(progress, 0.7, 1.0), seed).mask
-    return OtherPhoto(path.name, opened.pixels, opened.camera, found)
+    return OtherPhoto(path.name, colours_of(opened.picture), opened.camera, found)
 
 
 def _lift_all_round(
@@ -511,8 +512,9 @@ def _lift_all_round(
         raise ScriptError(f"more_views: the lifter {script.lift} makes a shape from one photo")
     photo, mask = document.photo, document.objects[k].selection
     assert mask is not None, "it was chosen"
-    matte, lifted = cut_out_beyond(photo.pixels, mask), None
-    subject = lift.LiftSubject(photo.pixels, photo.camera, is_selected(mask), matte)
+    pixels = colours_of(photo.picture)
+    matte, lifted = cut_out_beyond(pixels, mask), None
+    subject = lift.LiftSubject(pixels, photo.camera, is_selected(mask), matte)
     count = len(script.more_views)
     for number, wanted in enumerate(script.more_views):
         step = part(progress, number / count, (number + 1) / count)

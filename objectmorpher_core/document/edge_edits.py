@@ -13,6 +13,7 @@ import numpy as np
 from ..base.arrays import F32, U8, Mask, crop, frozen
 from .model import Document, EditObject, Matte, Photo
 from .settings import Refined
+from .transparency import colours_of
 
 
 def set_edge(document: Document, k: int, coverage: U8, mixed: Mask) -> Document:
@@ -50,7 +51,7 @@ def spill_of(photo: Photo, matte: Matte) -> F32:
     """(h, w, 3) sRGB, what of the background's colour is in the edge of a matte."""
     from ..segment.matting.repair import background_in_edge
 
-    return background_in_edge(photo.pixels, matte)
+    return background_in_edge(colours_of(photo.picture), matte)
 
 
 def decontaminated(photo: Photo, item: EditObject, spill: F32 | None = None) -> EditObject:

@@ -8,6 +8,7 @@ does anything for a photo without an alpha channel.
 from __future__ import annotations
 
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import cv2
 import numpy as np
@@ -166,10 +167,32 @@ def continued(picture: Picture, covered: Mask) -> Pixels:
         return picture.pixels
     seen = is_seen(picture.alpha)
     known = seen & ~covered
-    if not known.any() or seen.all():
+    if seen.all():
         return picture.pixels
+    if not known.any():  # nothing will be seen there either; whatever is hidden has no say in it
+        return colours_of(picture)
     return frozen(np.where((seen | covered)[..., None], picture.pixels,
                            _nearest(picture.pixels, known)))  # fmt: skip
+
+
+_colours: WeakKeyDictionary[Picture, Pixels] = WeakKeyDictionary()
+
+
+def colours_of(picture: Picture) -> Pixels:
+    """The pixels (H, W, 3) for what looks at the colours of things, and around them.
+
+    They are `continued` under clear ground. They are found once, and those of an opaque picture
+    are its own.
+    """
+    if picture.alpha is None:
+        return picture.pixels
+    if (known := _colours.get(picture)) is None:
+        seen = is_seen(picture.alpha)
+        known = picture.pixels
+        if not seen.all():
+            known = frozen(_nearest(known, seen if seen.any() else picture.alpha > 0))
+        _colours[picture] = known
+    return known
 
 
 def is_seen(alpha: np.ndarray) -> Mask:
@@ -214,7 +237,17 @@ def seen_plate(photo: Photo, plate: Plate | None, gone: tuple[Matte, ...]) -> Pl
     return replace(plate, pixels=on_checker(own, behind, photo.size, x0, y0))
 
 
+_seen: WeakKeyDictionary[Picture, Pixels] = WeakKeyDictionary()
+
+
 def seen(photo: Photo) -> Pixels:
-    """(H, W, 3) a photo as it is shown: on a checker where it is transparent."""
-    alpha = photo.picture.alpha
-    return photo.pixels if alpha is None else on_checker(photo.pixels, alpha, photo.size)
+    """(H, W, 3) a photo as it is shown: on a checker where it is transparent.
+
+    That is also what objects are selected in. It is made once.
+    """
+    picture = photo.picture
+    if picture.alpha is None:
+        return picture.pixels
+    if (known := _seen.get(picture)) is None:
+        known = _seen[picture] = on_checker(picture.pixels, picture.alpha, photo.size)
+    return known

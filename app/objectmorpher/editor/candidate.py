@@ -21,6 +21,7 @@ import numpy as np
 from objectmorpher_core.base.arrays import Mask, Selection
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Click, Photo, Prompt
+from objectmorpher_core.document.transparency import seen
 from objectmorpher_core.segment import Found
 
 from ..worker import job_functions
@@ -197,7 +198,7 @@ class Candidates:
                 editor.complain_of(error)
 
         editor.jobs.start(
-            "Selecting", job_functions.candidate, photo.pixels,
+            "Selecting", job_functions.candidate, seen(photo),
             edits.beside(document, editor.current, prompt), choice_of(editor),
             done=accept, failed=fail, cancelled=self._drop, replaced=self._forget_wanted,
             kind=CANDIDATE, is_quiet=True, is_spare=True,
@@ -215,7 +216,7 @@ class Candidates:
         editor = self._editor
         asked = edits.beside(editor.opened, editor.current, shown.prompt)
         editor.jobs.start(
-            "Looking closer", job_functions.closer_look, shown.photo.pixels, asked,
+            "Looking closer", job_functions.closer_look, seen(shown.photo), asked,
             choice_of(editor), done=accept, failed=lambda error: None, kind=CLOSER,
             is_quiet=True, is_spare=True,
         )  # fmt: skip
@@ -306,7 +307,7 @@ class CloserLook:
                 self._owed = None
 
         editor.jobs.start(
-            "Looking closer", job_functions.closer_look, document.photo.pixels, asked,
+            "Looking closer", job_functions.closer_look, seen(document.photo), asked,
             choice_of(editor), done=accept, failed=fail, kind=LOOK, is_quiet=True, is_spare=True,
         )  # fmt: skip
 

@@ -15,6 +15,7 @@ import numpy as np
 from objectmorpher_core.base.arrays import Mask, Selection
 from objectmorpher_core.document import edge_edits, edits
 from objectmorpher_core.document.model import Document, LiftedObject, Plate
+from objectmorpher_core.document.transparency import colours_of
 from objectmorpher_core.segment.mask_edit import as_coverage
 
 from ..system.texts import t
@@ -111,7 +112,7 @@ class Refits:
         editor.jobs.start(
             t("Fitting {name} to its new outline", name=item.name), job_functions.refit,
             Lifted(item.shaped, matte, lifted, item.shape),
-            ImportTarget(photo.pixels, photo.camera, outline, mixed=item.mixed),
+            ImportTarget(colours_of(photo.picture), photo.camera, outline, mixed=item.mixed),
             background_of(document, k, editor.settings.backends.inpaint), document.seed,
             done=accept, failed=fail, kind=REFIT,
         )  # fmt: skip

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.transparency import colours_of
 
 from ..canvas.shape import Shapes, build_ready
 from ..system.texts import t
@@ -61,7 +62,7 @@ class Tabs:
             chosen = [item for item in document.objects if item.selection is not None]
             if chosen and (mask := chosen[-1].selection) is not None:
                 photo = document.photo
-                return OtherPhoto(photo.name, photo.pixels, photo.camera, mask)
+                return OtherPhoto(photo.name, colours_of(photo.picture), photo.camera, mask)
         return None
 
     def add(self) -> None:

@@ -25,6 +25,7 @@ from objectmorpher_core.document.model import (
     Prompt,
 )
 from objectmorpher_core.document.settings import Hint
+from objectmorpher_core.document.transparency import colours_of, continued, seen
 from objectmorpher_core.segment import Found
 
 from ..canvas.layer import ExactPicture, Rendered
@@ -157,7 +158,7 @@ class Tasks:
             self._unreadable = document.photo
 
         editor.jobs.start(
-            t("Reading the photo"), job_functions.read_photo, document.photo.pixels,
+            t("Reading the photo"), job_functions.read_photo, seen(document.photo),
             editor.settings.backends.segment,
             done=lambda _: None, failed=fail, cancelled=cancelled, kind=READ,
             is_quiet=is_quiet, is_spare=is_spare,
@@ -195,7 +196,7 @@ class Tasks:
             editor.complain_of(error.retried_by(lambda: self.segment(question, take)))
 
         editor.jobs.start(
-            t("Selecting"), job_functions.segment, photo.pixels,
+            t("Selecting"), job_functions.segment, seen(photo),
             edits.beside(document, question.k, question.prompt),
             BackendChoice(editor.settings.backends.segment, document.seed),
             done=lambda found: editor.answers.take(lambda: give(found)), failed=fail,
@@ -265,7 +266,9 @@ class Tasks:
             count=editor.settings.gaussians, horizon=document.horizon,
         )  # fmt: skip
         asked = _Asked(k, wish, thing.shape)
-        cut = Cut(document.photo.pixels, document.photo.camera, thing.selection, thing.mixed)
+        cut = Cut(
+            colours_of(document.photo.picture), document.photo.camera, thing.selection, thing.mixed
+        )
         choice = BackendChoice(editor.settings.backends.lift, document.seed)
 
         def fail(error: JobError) -> None:
@@ -437,7 +440,7 @@ class Tasks:
         self._front = (mask, None)
         editor.jobs.start(
             t("Cutting out what stays in front"), job_functions.cut_front,
-            document.photo.pixels, item.selection, item.mixed,
+            colours_of(document.photo.picture), item.selection, item.mixed,
             done=accept, failed=editor.complain_of, kind=FRONT,
         )  # fmt: skip
         return True
@@ -466,7 +469,6 @@ class Tasks:
 
     def _ask_plate(self, document: Document, wanted: Wanted) -> None:
         from objectmorpher_core.compose.plate.plate import plate_cover
-        from objectmorpher_core.document.transparency import continued
 
         editor, covered = self._editor, plate_cover(document)
 

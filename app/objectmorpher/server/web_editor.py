@@ -44,7 +44,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Click, Document, Pose, Prompt
 from objectmorpher_core.document.placement import placement_of
-from objectmorpher_core.document.transparency import seen
+from objectmorpher_core.document.transparency import colours_of, seen
 from objectmorpher_core.pictures.image import (
     Picture,
     at_most,
@@ -116,7 +116,7 @@ class WebEdit:
             raise EditError("click the object first")
         if self.reading is None:
             read = part(progress, 0.0, 0.8)
-            self.reading = pipeline.read_photo(self.opened.photo.pixels, segment.load(), read)
+            self.reading = pipeline.read_photo(seen(self.opened.photo), segment.load(), read)
         found = self.reading.segment(wanted, part(progress, 0.8, 1.0), self.opened.seed)
         document = edits.set_mask(edits.add_object(self.opened), 0, found.mask, wanted)
         self.chosen = document.with_backend("segment", found.backend)
@@ -128,7 +128,7 @@ class WebEdit:
         photo, item = document.photo, document.objects[0]
         assert item.selection is not None, "it was chosen"
         made = pipeline.lift_mask(
-            photo.pixels, photo.camera, item.selection,
+            colours_of(photo.picture), photo.camera, item.selection,
             progress=part(progress, 0.0, 0.5), seed=document.seed,
         )  # fmt: skip
         document = edits.set_lifted(document, 0, *made)

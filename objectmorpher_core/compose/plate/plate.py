@@ -20,7 +20,7 @@ from ...base.masks import LARGE
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint
-from ...document.transparency import alpha_behind
+from ...document.transparency import alpha_behind, colours_of
 from .. import Inpainter, InpaintError, LooksFar, TakesHints
 from ..blend import Box, distance
 from .residue import (
@@ -242,7 +242,8 @@ def plate_of_holes(
     ghosts = find_ghosts(document, near) if ghosts is None else ghosts
     plate = base or shaded_plate(document, holes, ghosts)
     if plate is not None:
-        shares, photo = shown_shares(document, ghosts, holes), document.photo.pixels
+        shares = shown_shares(document, ghosts, holes)
+        photo = colours_of(document.photo.picture)
         plate = _rejoined(plate, photo, ghosts, shares, margin)
         plate = with_ghosts(plate, photo, ghosts, shares)
     rest = [o for o in document.objects if o.hides_background and o.matte not in holes]
@@ -317,7 +318,8 @@ def shaded_plate(
     plate = without_ghosts(plate, document, ghosts, holes)
     if not still:
         return plate
-    return _in_shade(plate, document.photo.pixels, still, hole_margin(*document.photo.size))
+    photo, margin = colours_of(document.photo.picture), hole_margin(*document.photo.size)
+    return _in_shade(plate, photo, still, margin)
 
 
 def shaded(document: Document, holes: tuple[Matte, ...]) -> tuple[Matte, ...]:

@@ -17,7 +17,7 @@ from ...base.arrays import F32, RGB, Mask, Pixels, crop, pixels_from_unit, unit_
 from ...base.masks import box_of, dilated
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Plate
-from ...document.transparency import continued
+from ...document.transparency import colours_of, continued
 from ...pictures.image import to_u8
 from .. import Inpainter
 from .plate import Box, correction, cut, fill_weight, hole_margin, plate_cover, plate_crop
@@ -98,7 +98,7 @@ def with_patch(document: Document, patch: PlatePatch, backend: str) -> Plate:
     plate = document.plate
     assert plate is not None, "make the plate first"
     painted = patch.coverage > 0
-    grown = _grown(plate, document.photo.pixels, _bounds(painted, patch.box))
+    grown = _grown(plate, colours_of(document.photo.picture), _bounds(painted, patch.box))
     inner = _shared(grown, patch.box)
     there = cut(painted, patch.box, inner)
     assert grown.painted is not None
@@ -114,7 +114,7 @@ def restored(document: Document, patch: PlatePatch) -> Plate:
     """The plate with the photo's own pixels where they are painted and no object hides them."""
     plate = document.plate
     assert plate is not None, "make the plate first"
-    grown = _grown(plate, document.photo.pixels, plate.box)
+    grown = _grown(plate, colours_of(document.photo.picture), plate.box)
     inner = _shared(grown, patch.box)
     if inner[0] >= inner[2] or inner[1] >= inner[3]:
         return plate
@@ -122,7 +122,7 @@ def restored(document: Document, patch: PlatePatch) -> Plate:
     pixels = cut(grown.pixels, grown.box, inner)
     hole = cut(grown.hole, grown.box, inner)
     x0, y0, x1, y1 = inner
-    photo = document.photo.pixels[y0:y1, x0:x1]
+    photo = colours_of(document.photo.picture)[y0:y1, x0:x1]
     is_own = share > WHOLLY
     old = unit_pixels(pixels)
     mixed = pixels_from_unit(old + share[..., None] * (unit_pixels(photo) - old), photo.dtype)

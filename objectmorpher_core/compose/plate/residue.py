@@ -25,6 +25,7 @@ from ...base.threads import core_count
 from ...document.model import Document, EditObject, Matte, Placement, Plate
 from ...document.placement import is_in_place
 from ...document.settings import GAMMA
+from ...document.transparency import colours_of
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
@@ -343,7 +344,7 @@ def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
 def _tint(document: Document, plate: Plate, box: Box, there: Mask) -> float:
     """Return `Ghost.tint` of what is `there` (h, w) in a box of the plate."""
     x0, y0, x1, y1 = box
-    photo = document.photo.pixels[plate.top : plate.box[3], plate.left : plate.box[2]]
+    photo = colours_of(document.photo.picture)[plate.top : plate.box[3], plate.left : plate.box[2]]
     seen, behind = (
         unit_pixels(image[y0:y1, x0:x1][there]).mean(0) + BLACK for image in (photo, plate.pixels)
     )
@@ -410,7 +411,7 @@ def without_ghosts(
     plate: Plate, document: Document, ghosts: Sequence[Ghost], holes: Sequence[Matte]
 ) -> Plate:
     """The plate without the ghosts that go with what has left, however far that is by now."""
-    photo, objects = document.photo.pixels, document.objects
+    photo, objects = colours_of(document.photo.picture), document.objects
     goes = [_has_left(objects[g.owner], holes) and not _stays(g, document) for g in ghosts]
     return with_ghosts(plate, photo, ghosts, [float(each) for each in goes])
 
@@ -479,7 +480,7 @@ def with_refused(plate: Plate, document: Document, near: float) -> Plate:
         there = ghost.there if is_all else ghost.there & erased[y0:y1, x0:x1]
         if there.any():
             refused.append(replace(ghost, there=there))
-    return with_ghosts(plate, document.photo.pixels, refused, [0.0] * len(refused))
+    return with_ghosts(plate, colours_of(document.photo.picture), refused, [0.0] * len(refused))
 
 
 # What of it may be a part of the object, to be added to its selection.
@@ -525,8 +526,8 @@ def _unlike_fill(ghost: Ghost, document: Document) -> Mask:
     """(h, w) of its box: the px that show it, and not the seam around it."""
     plate, (x0, y0, x1, y1) = document.plate, ghost.box
     assert plate is not None, "pieces are of a plate"
-    seen, behind = document.photo.pixels[_in_photo(ghost, document)], plate.pixels[y0:y1, x0:x1]
-    unlike = np.abs(unit_pixels(seen) - unit_pixels(behind)).max(-1)
+    seen = colours_of(document.photo.picture)[_in_photo(ghost, document)]
+    unlike = np.abs(unit_pixels(seen) - unit_pixels(plate.pixels[y0:y1, x0:x1])).max(-1)
     return ghost.there & (cv2.blur(unlike, (3, 3)) > 2 * VISIBLE)
 
 
@@ -570,7 +571,7 @@ def erased_by(
 def is_like_owner(ghost: Ghost, document: Document, margin: float) -> bool:
     """Whether enough shows it, and has colours of its object's own; `margin` as in `left_out`."""
     own = _unlike_fill(ghost, document)
-    photo, plate = document.photo.pixels, document.plate
+    photo, plate = colours_of(document.photo.picture), document.plate
     mask = document.objects[ghost.owner].mask
     if mask is None or plate is None or own.sum() < (LEAST_PART * margin) ** 2:
         return False

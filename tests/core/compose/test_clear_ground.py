@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.base.arrays import Mask, Pixels
+from objectmorpher_core import api
+from objectmorpher_core.base.arrays import Mask, Pixels, crop
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import composite
@@ -18,8 +19,8 @@ from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.compose.refine import refinement
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
-from objectmorpher_core.document.transparency import continued
-from objectmorpher_core.pictures.image import Picture, encode_picture
+from objectmorpher_core.document.transparency import STEP, colours_of, continued, seen
+from objectmorpher_core.pictures.image import Picture, array_of, encode_picture
 from objectmorpher_core.pipeline import lift_mask, make_plate
 from objectmorpher_core.scripting.runner import coarse_edit
 from tests.photos import photo
@@ -38,6 +39,16 @@ ITEM = cv2.ellipse(np.zeros(SIZE[::-1], np.uint8), (108, 93), (48, 42), 0, 0, 36
 SHOWN = {  # where the photo is not clear
     "a half": (np.arange(SIZE[0]) < 165) | ITEM,
     "the thing alone": cv2.dilate(ITEM.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0,
+}
+SOFT = {  # u8 alpha, which fades
+    "a soft thing": cv2.GaussianBlur(255 * ITEM.astype(np.uint8), (0, 0), 2.0),
+    "a soft half": np.tile(np.clip(20 * (165 - np.arange(SIZE[0])), 0, 255), (SIZE[1], 1)),
+}
+EDITS = {
+    "moved": lambda edit: edit.move(90.0, 20.0).scale(0.7),
+    "turned": lambda edit: edit.turn(yaw=25.0),
+    "rolled": lambda edit: edit.turn(pitch=5.0, roll=12.0),
+    "dragged": lambda edit: edit.pin(108, 125).drag((108, 70), (150, 50)),
 }
 everywhere = pytest.mark.parametrize("where", SHOWN)
 
@@ -103,6 +114,70 @@ def test_the_focus_is_that_of_what_is_seen():
 def test_around_a_thing_on_clear_ground_nothing_says_what_light_it_has():
     lights = [Lighting(document).light for document in _alike("the thing alone", is_smooth=True)]
     assert all(np.isnan(light).mean() > 0.6 for light in lights)
+
+
+def _opacity(name: str) -> np.ndarray:
+    """(H, W) u8 alpha, by its name in SHOWN or SOFT."""
+    if name in SOFT:
+        return SOFT[name].astype(np.uint8)
+    return np.broadcast_to(SHOWN[name], ITEM.shape).astype(np.uint8) * np.uint8(255)
+
+
+@cache
+def _pictures(name: str) -> tuple[Picture, ...]:
+    alpha = _opacity(name)
+    return tuple(
+        Picture(np.where(alpha[..., None] > 0, SMALL, hidden), alpha) for hidden in HIDDEN.values()
+    )
+
+
+@cache
+def _lifts(name: str) -> tuple[api.Edit, ...]:
+    """Each lifted anew, by the shape that it is seen to have."""
+    opened = [api.open(array_of(picture)).mask(ITEM) for picture in _pictures(name)]
+    return tuple(edit.lift(gaussians=6000) for edit in opened)
+
+
+@pytest.mark.parametrize("name", [*SHOWN, *SOFT])
+@pytest.mark.parametrize("edit", EDITS)
+def test_of_photos_that_look_alike_each_edit_looks_the_same(name, edit):
+    """Also where the thing is selected, cut out, lifted and filled in behind anew."""
+    first, *others = (_seen(EDITS[edit](each).render().edited.document) for each in _lifts(name))
+    for other in others:
+        assert np.array_equal(other, first)
+
+
+@pytest.mark.parametrize("name", [*SHOWN, *SOFT])
+def test_what_is_hidden_is_neither_looked_at_nor_selected_in(name):
+    camera = Camera.from_fov(*SIZE)
+    for picture in _pictures(name):
+        first = _pictures(name)[0]
+        assert np.array_equal(colours_of(picture), colours_of(first))
+        photos = [Photo(each, camera, b"", "cut.png") for each in (picture, first)]
+        assert np.array_equal(seen(photos[0]), seen(photos[1]))
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_a_click_selects_the_same_thing_whatever_is_hidden(name):
+    opened = [api.open(array_of(picture)).click(108, 93) for picture in _pictures(name)]
+    first, *others = (edit.selection for edit in opened)
+    assert all(np.array_equal(other, first) for other in others)
+
+
+def test_the_colours_of_an_opaque_photo_are_its_own():
+    solid = np.full(SMALL.shape[:2], 255, np.uint8)
+    for picture in (Picture(SMALL), Picture(SMALL, solid)):
+        assert colours_of(picture) is picture.pixels
+
+
+def test_a_thing_alone_on_clear_ground_is_cut_out_as_it_is_there():
+    """Its alpha is the photo's, whatever is hidden around it."""
+    alpha = SOFT["a soft thing"]
+    for edit in _lifts("a soft thing"):
+        matte = edit.document.objects[0].matte
+        assert matte is not None
+        own = crop(alpha, (0, 0, *SIZE), matte.box)
+        assert np.abs(matte.alpha - own / 255)[own > 0].max() < STEP
 
 
 class Paling:

@@ -14,7 +14,7 @@ from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
 from objectmorpher_core.document.settings import Finish, Hint, Shadow, Share
-from objectmorpher_core.document.transparency import continued
+from objectmorpher_core.document.transparency import colours_of, continued
 
 from ...canvas.layer import CanvasLayer
 from ...canvas.memo import same
@@ -367,7 +367,7 @@ class Composing:
 
         editor.jobs.start(
             t("Looking how deep the photo is"), job_functions.look_at_depth,
-            document.photo.pixels,
+            colours_of(document.photo.picture),
             done=lambda depth: self._answers.add(lambda: accept(depth)),
             failed=editor.complain_of, kind=DEPTH,
         )  # fmt: skip

@@ -15,6 +15,7 @@ from objectmorpher_core.base.arrays import F32, U8, Mask
 from objectmorpher_core.base.brush import Brush, Stroke
 from objectmorpher_core.document import edge_edits, edits
 from objectmorpher_core.document.model import EditObject, Photo
+from objectmorpher_core.document.transparency import colours_of
 
 from ...system.texts import t
 from ...tools.pointer import Pointer
@@ -126,7 +127,7 @@ class Edging(WaitingChanges[EdgeWish]):
 
         editor.jobs.start(
             t("Looking for the edge"), job_functions.brush_edge,
-            EdgeStroke(wish.photo.pixels, thing.selection, thing.mixed, wish.painted),
+            EdgeStroke(colours_of(wish.photo.picture), thing.selection, thing.mixed, wish.painted),
             wish.is_erasing, done=lambda answer: editor.answers.take(lambda: accept(answer)),
             failed=fail, cancelled=lambda: self._waiting.clear() if self._is_first(wish) else None,
             kind=self.kind,

@@ -26,6 +26,7 @@ from objectmorpher_core.document.model import (
     Matte,
     Placement,
 )
+from objectmorpher_core.document.transparency import colours_of
 
 from ...canvas.layer import CanvasLayer
 from ...system.texts import t
@@ -375,7 +376,8 @@ class Shaping:
         is_alone = not any(o.lifted for o in document.objects if o is not thing)
         is_guess = photo.camera == Camera.from_fov(*photo.size)
         is_free, mixed = is_alone and is_guess, thing.mixed
-        return ImportTarget(photo.pixels, photo.camera, thing.selection, is_free, mixed)
+        pixels = colours_of(photo.picture)
+        return ImportTarget(pixels, photo.camera, thing.selection, is_free, mixed)
 
     def _take_import(
         self, k: int, fitting: Fitting, matte: Matte, lifted: LiftedObject, label: str
