@@ -544,9 +544,13 @@ def _spread(member: F32, dark: F32, thrown: F32, least: float, free: Mask) -> F3
 
 
 def _imitated(found: TriedShadow) -> Shadow:
-    """The numbers of a shadow that takes as much light (see `shadow`)."""
+    """The numbers of a shadow that takes as much light (see `shadow`).
+
+    Its strength is that of what is thrown: a contact is continued beneath the object, where none
+    of it is seen, and may be told far darker. All of the shadow would then be as dark.
+    """
     darkest = 1 - np.exp(-found.dark * float(found.thrown.max()))
     below = 1 - np.exp(-found.contact * float(taken(np.ones((1, 1), np.float32)).max()))
-    strength = float(np.clip(max(darkest, below) / DARKEST, 0, 1))
+    strength = float(np.clip(darkest / DARKEST, 0, 1))
     contact = float(np.clip(below / max(strength * DARKEST, 1e-6), 0, 1))
     return replace(found.shadow, strength=strength, contact=contact)

@@ -12,6 +12,7 @@ from skimage import data
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.shadow.old_shadow import OldShadow, traceless_plate, without_shadow
+from objectmorpher_core.compose.shadow.shadow import DARKEST
 from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Matte, Placement
@@ -20,7 +21,18 @@ from objectmorpher_core.scripting.options import script_from
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
 from tests.shadow_scenes import scene
-from tests.shadowed import DARK, HEIGHT, WIDTH, ground_of, inside, photo_of, thrown
+from tests.shadowed import (
+    DARK,
+    FOOT,
+    HEIGHT,
+    MIDDLE,
+    RADII,
+    WIDTH,
+    ground_of,
+    inside,
+    photo_of,
+    thrown,
+)
 from tests.tree import quick
 
 WAYS = [(35.0, 0.8), (150.0, 0.8), (-20.0, 1.1)]  # degrees and lengths of shadows
@@ -48,6 +60,20 @@ def test_a_shadow_is_found_with_its_direction_and_length(direction, length):
     assert abs((shadow.direction - direction + 180) % 360 - 180) < 25
     assert length / 1.5 < shadow.length < length * 1.5
     assert 0.4 < shadow.strength < 0.85
+
+
+@pytest.mark.parametrize("direction", quick([35.0, 150.0], 1))
+@pytest.mark.parametrize("taken", quick([0.2, 0.3, 0.4], 2))
+@pytest.mark.parametrize("touching", quick([0.9, 0.6], 1))
+def test_a_dark_contact_does_not_darken_the_whole_shadow(direction, taken, touching):
+    """A faint shadow of a thing beneath which it is nearly black stays as faint."""
+    x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
+    foot, half = MIDDLE[0], RADII[0]
+    contact = np.exp(-(((x - foot) / half) ** 4) - ((y - FOOT) / 5) ** 2)
+    dark = 1 - (1 - taken * thrown(direction, 0.8)) * (1 - touching * contact)
+    shadow = _found(photo_of(dark, dark=1.0)).shadow
+    assert DARKEST * shadow.strength == pytest.approx(taken, abs=0.08)
+    assert shadow.contact > 0.4
 
 
 def test_what_is_known_of_the_ground_is_used():
