@@ -199,7 +199,9 @@ class OldShadows:
             return False
         if item.shadow.strength > 0:
             return False
-        if not has_left(item, document):  # it is back: what is moved then is a new move
+        alike = (o for o in document.objects if o.matte is item.matte)
+        if not all(has_left(o, document) for o in alike):  # one stands in its shadow in the photo
+            # What leaves it last is a new move.
             self._looked_for.discard(item.matte)
             return False
         return item.matte not in self._looked_for
