@@ -21,7 +21,7 @@ from editor_steps import (
     wait_until,
 )
 from objectmorpher.canvas.frame import build_frame, drawn_order
-from objectmorpher.commands import COMMANDS, label_of, meaning_of, run, why_not
+from objectmorpher.commands import COMMANDS, label_of, meaning_of, next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
@@ -150,6 +150,25 @@ def test_hiding_takes_it_out_of_the_picture_by_a_command_too(
     assert COMMANDS["hide"].is_on is not None and COMMANDS["hide"].is_on(editor)
     run(editor, "hide")
     assert editor.object is not None and editor.object.is_visible
+
+
+def test_what_is_taken_out_is_out_of_sight_and_the_picture_is_ready(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    editor.view.tool = ToolName.SELECT
+    assert next_step(editor) == ("Pose the object", "pose") and not editor.landing.is_current_gone
+    run(editor, "take_out")
+    assert editor.message is not None
+    assert editor.message.text == "Object 1 is taken out of the photo"
+    assert next_step(editor) == ("Export photo…", "export")
+    assert editor.landing.is_current_gone
+    editor.view.is_before = True
+    assert not editor.landing.is_current_gone, "the photo shows it"
+    editor.view.is_before = False
+    assert editor.message.action is not None
+    editor.message.action.run()
+    assert next_step(editor) == ("Pose the object", "pose") and not editor.landing.is_current_gone
 
 
 def test_taking_out_shows_the_background_and_putting_back_the_photo(

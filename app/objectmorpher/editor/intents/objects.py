@@ -108,13 +108,17 @@ class Objects:
         if document is None or not editor.is_lifted or editor.hand.is_busy:
             return
         editor.apply(t("Take out of the photo"), edits.set_visible(document, k, False))
-        self.say_hidden(k)
+        name = document.objects[k].name
+        self._say_unseen(t("{name} is taken out of the photo", name=name), k)
 
     def say_hidden(self, k: int) -> None:
         """That object `k` is hidden, with a button that shows it."""
         name = self._editor.opened.objects[k].name
+        self._say_unseen(t("{name} is hidden", name=name), k)
+
+    def _say_unseen(self, text: str, k: int) -> None:
         action = Action(t("Show object"), lambda: self.toggle_visible(k))
-        self._editor.say(t("{name} is hidden", name=name), action)
+        self._editor.say(text, action)
         self._hidden = self._editor.message
 
     def forget_lost(self) -> None:
