@@ -131,6 +131,18 @@ def test_with_one_object_there_is_no_order(editor: Editor, ball: Document) -> No
     assert why_not(editor, "forward") == "There is no other object"
 
 
+def test_a_copy_is_announced_until_it_is_moved(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    editor.view.tool = ToolName.POSE
+    run(editor, "duplicate")
+    said = editor.message
+    assert said is not None and "lies exactly over the original" in said.text
+    editor.choose_tool(ToolName.PLACE)  # to drag it away
+    assert editor.message is said
+    editor.apply("Move object", edits.set_placement(ball, 0, Placement(move=(9.0, 0.0))))
+    assert editor.message is None
+
+
 def test_removing_the_copy_leaves_the_object_and_its_background(copied: Editor) -> None:
     run(copied, "remove_object")
     assert copied.document is not None

@@ -37,6 +37,7 @@ class Objects:
         self.renaming: int | None = None  # whose name is being typed
         self.carried: int | None = None  # whose row is being dragged up or down the list
         self._hidden: StatusMessage | None = None  # that one is hidden, as it was said last
+        self._copied: StatusMessage | None = None  # that the current object is a copy
 
     def start_another(self) -> None:
         """The next click selects another object."""
@@ -157,6 +158,12 @@ class Objects:
             self._editor.say(
                 t("{name} lies exactly over the original · Drag it away", name=twin.name)
             )
+            self._copied = self._editor.message
+
+    @property
+    def is_copy_announced(self) -> bool:
+        """Whether it is said that a copy is to be dragged away, for which a tool may be chosen."""
+        return self._copied is not None and self._editor.message is self._copied
 
     @property
     def _is_in_photo(self) -> bool:
