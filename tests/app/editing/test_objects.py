@@ -187,6 +187,7 @@ def test_taking_out_shows_the_background_and_putting_back_the_photo(
     copied: Editor, ball: Document
 ) -> None:
     assert label_of(copied, "remove_object") == "Discard object", "a copy is in no photo"
+    assert not copied.objects.is_to_be_taken_out
     assert meaning_of(copied, "remove_object") == ""
     run(copied, "remove_object")
     assert copied.history is not None and copied.history.undo_label == "Discard object"
@@ -195,6 +196,7 @@ def test_taking_out_shows_the_background_and_putting_back_the_photo(
     assert label_of(copied, "remove_object") == "Put back into the photo"
     told = [meaning_of(copied, name) for name in ("hide", "take_out", "remove_object")]
     assert all(told) and len(set(told)) == 3, "each is told apart from the others"
+    assert copied.objects.is_to_be_taken_out, "by the bin"
     run(copied, "take_out")
     assert copied.object is not None and not copied.object.is_visible
     assert copied.message is not None and copied.message.action is not None

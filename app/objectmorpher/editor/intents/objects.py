@@ -180,6 +180,14 @@ class Objects:
         """What removing the current object is called."""
         return t("Put back into the photo") if self._is_in_photo else t("Discard object")
 
+    @property
+    def is_to_be_taken_out(self) -> bool:
+        """Whether a bin takes the current object out of the picture: it is lifted off the photo.
+
+        What is no part of the photo, or only selected, is dropped from the list instead.
+        """
+        return self._editor.is_lifted and self._is_in_photo
+
     def remove(self) -> None:
         """The current object is not edited any more: the photo shows it as it was."""
         editor = self._editor
