@@ -341,6 +341,37 @@ def test_a_shadow_that_would_stay_behind_is_offered_once_what_threw_it_is_moved(
     wait_until(editor, lambda: editor.old_shadows.offer is not None)
 
 
+def test_it_is_said_only_as_long_as_a_shadow_is_outlined(editor: Editor) -> None:
+    document = standing(thrown(35.0, 0.8))
+    moved = document.objects[0].placement
+    editor.start(edits.set_placement(edits.duplicate(document, 0), 1, Placement()))
+    editor.view.tool = ToolName.PLACE
+    editor.apply("Move", edits.set_placement(editor.opened, 1, moved))
+    wait_until(editor, lambda: editor.old_shadows.offer is not None)
+    said = editor.message
+    editor.poll()
+    assert said is not None and editor.message is said
+    editor.objects.choose(0)
+    editor.poll()
+    assert editor.old_shadows.offer is None and editor.message is None
+
+
+def test_no_copy_is_offered_the_shadow_in_which_another_one_stands(editor: Editor) -> None:
+    document = standing(thrown(35.0, 0.8))
+    moved = document.objects[0].placement
+    editor.start(edits.set_placement(document, 0, Placement()))
+    editor.objects.duplicate()
+    editor.view.tool = ToolName.PLACE
+    editor.apply("Move", edits.set_placement(editor.opened, 1, moved))
+    for _ in range(3):
+        editor.poll()
+        assert not editor.jobs.is_busy(SHADOW)
+    wait_for_jobs(editor)
+    assert editor.old_shadows.offer is None and editor.message is None
+    editor.apply("Hide object", edits.set_visible(editor.opened, 0, False))
+    wait_until(editor, lambda: editor.old_shadows.offer is not None)
+
+
 @pytest.mark.slow
 def test_a_shadow_is_looked_for_on_the_ground_that_is_said(editor: Editor) -> None:
     document = set_seen_from(standing(None), 0, 45.0)

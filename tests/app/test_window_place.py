@@ -11,8 +11,13 @@ from hands import opened
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.gizmo import gizmo
-from objectmorpher_core.document.model import Document
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, LiftSettings, Prompt
+from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
 from objectmorpher_core.session.file import save_session
+from tests.shadowed import inside, photo_of, thrown
+from tests.shapes import png
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
 
@@ -47,3 +52,27 @@ def test_turning_by_a_ring_and_going_back(
         hands.press("ctrl+z")
         hands.wait(lambda: "edited" not in hands.title(), "going back")
         assert not hands.is_accent(PRIMARY)
+
+
+def test_a_shadow_that_is_offered_is_outlined_with_every_tool(
+    without_networks: dict[str, str], tmp_path: Path
+) -> None:
+    pixels, session = photo_of(thrown(35.0, 0.8)), tmp_path / "thing.omorph"
+    document = open_photo(png(pixels), "thing.png")
+    document = edits.set_mask(edits.add_object(document), 0, inside(), Prompt())
+    made = lift_mask(pixels, document.photo.camera, inside(), "relief", LiftSettings(800, trust=0))
+    document = edits.set_lifted(document, 0, *made)
+    save_session(
+        edits.set_plate(document, make_plate(pixels, plate_cover(document), "telea")), session
+    )
+    with opened(without_networks, session) as hands:
+        hands.press("4")
+        hands.press("Shift+Left")
+        hands.area("Take it along")
+        for tool in ("1", "2", "3", "4", "6"):
+            hands.press(tool)
+            hands.settle()
+            hands.area("Take it along")
+            hands.area("Offered shadow")
+        hands.press("Escape")
+        hands.wait(lambda: "Offered shadow" not in hands.places(), "refusing it")

@@ -19,7 +19,7 @@ from objectmorpher_core.session.file import save_session
 pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 SCREEN = (900, 600)
-PANEL, REMOVE = "Panel (F8)", "Put back into the photo (Shift+Delete)"
+PANEL, REMOVE = "Panel (F8)", "Take out of the photo"
 
 
 @contextmanager

@@ -224,10 +224,11 @@ def next_step(editor: Editor) -> tuple[str, str | None]:
     if not editor.is_lifted:
         is_kept = editor.object is not None and editor.object.stays_in_front
         return (t("Another object"), "another") if is_kept else (t("Lift object"), "lift")
-    is_moved = editor.object is not None and editor.object.is_moved
-    if editor.view.tool in (ToolName.SELECT, ToolName.MASK) or (
+    is_moved, is_gone = editor.chosen.is_moved, not editor.chosen.is_visible
+    is_before_posing = editor.view.tool in (ToolName.SELECT, ToolName.MASK) or (
         editor.view.tool is ToolName.LOOK and not is_moved
-    ):
+    )
+    if is_before_posing and not is_gone:
         return t("Pose the object"), "pose"
     if not is_moved:
         is_posing = editor.view.tool is ToolName.POSE

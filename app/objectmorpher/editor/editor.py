@@ -296,7 +296,7 @@ class Editor(EditorState):
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
             self.say(self.why_no_shape)
             return
-        if tool is not self.view.tool:
+        if tool is not self.view.tool and not self.objects.is_copy_announced:
             self.drop_hint()
         self.view.tool = tool
         self.hover = Hover()

@@ -20,7 +20,19 @@ from ...document.model import Document, Plate
 from ...document.transparency import colours_of, continued
 from ...pictures.image import to_u8
 from .. import Inpainter
-from .plate import Box, correction, cut, fill_weight, hole_margin, plate_cover, plate_crop
+from ..blend import distance
+from .plate import (
+    RAMP,
+    SEAM,
+    Box,
+    correction,
+    cut,
+    fill_weight,
+    hole_margin,
+    plate_cover,
+    plate_crop,
+)
+from .residue import find_residue
 
 RIM = 0.5  # x hole margin: the inpainter fills so much more, to compare with what is there
 CONTEXT = 0.6  # x the painted box's longer side, kept around it for the inpainter to copy from
@@ -150,29 +162,29 @@ def refitted_plate(
 ) -> Plate:
     """The plate for what objects hide now: filled in where they hide more, the photo where less.
 
-    Everywhere else, and where it was repaired by hand, it stays as it is, to the last bit.
+    The photo is also back where what is hidden no more had left residue beside it. Everywhere else,
+    and where it was repaired by hand, it stays as it is, to the last bit.
     """
     height, width = change.before.shape
     margin = hole_margin(width, height)
-    away = (
-        cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
-        for covered in (change.before, change.after)
+    before, after = (
+        fill_weight(distance(covered), margin) for covered in (change.before, change.after)
     )
-    before, after = (fill_weight(np.asarray(px, np.float32), margin) for px in away)
     if (after == before).all():
         return change.plate
     grown = _grown(change.plate, change.pixels, _bounds(after + before > 0, (0, 0, width, height)))
     x0, y0, x1, y1 = grown.box
     old, new = (weight[y0:y1, x0:x1] for weight in (before, after))
     free = ~grown.painted
-    is_less, is_more = (new < old) & free, (new > old) & free
+    is_beside = grown.hole & (old <= 0) & (new <= 0)
+    share = np.where(is_beside, _kept_residue(change, grown.box), new / np.maximum(old, 1e-6))
+    is_less, is_more = ((new < old) | (is_beside & (share < 1))) & free, (new > old) & free
     photo = unit_pixels(change.pixels[y0:y1, x0:x1])
-    share = (new / np.maximum(old, 1e-6))[..., None]
     mixed = pixels_from_unit(
-        photo + share * (unit_pixels(grown.pixels) - photo), change.pixels.dtype
+        photo + share[..., None] * (unit_pixels(grown.pixels) - photo), change.pixels.dtype
     )
     np.copyto(grown.pixels, mixed, where=is_less[..., None])
-    grown.hole[is_less & (new <= 0)] = False
+    grown.hole[is_less & (share <= 0)] = False
     if is_more.any():
         more = np.where(is_more, (new - old) / np.maximum(1 - old, 1e-6), 0).astype(np.float32)
         plate = replace(change.plate, left=grown.left, top=grown.top, pixels=grown.pixels,
@@ -186,6 +198,26 @@ def refitted_plate(
     is_painted = change.plate.painted is not None
     return Plate(grown.left, grown.top, grown.pixels, grown.hole, change.plate.backend,
                  change.plate.seed, grown.painted if is_painted else None)  # fmt: skip
+
+
+def _kept_residue(change: Uncovering, box: Box) -> F32:
+    """(h, w) of the box, in [0, 1]: how much stays of what is invented beside the objects there.
+
+    What is nearer to what is hidden no more than to what still is was left by the former. It goes,
+    unless it is just as well residue of the latter.
+    """
+    x0, y0, x1, y1 = box
+    height, width = change.before.shape
+    margin = hole_margin(width, height)
+    gone = change.before & ~change.after
+    if not gone.any():
+        return np.ones((y1 - y0, x1 - x0), np.float32)
+    residue = change.after  # of nothing there is none
+    if residue.any():
+        residue = find_residue(change.pixels, change.after, margin)
+    to_gone, to_there = (distance(there)[y0:y1, x0:x1] for there in (gone, change.after))
+    of_there = np.clip((to_gone - to_there) / (RAMP * SEAM * margin), 0, 1)
+    return np.maximum(fill_weight(distance(residue)[y0:y1, x0:x1].copy(), margin), of_there)
 
 
 def thumbnail(photo: Pixels, plate: Plate) -> RGB:

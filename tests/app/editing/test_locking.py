@@ -89,6 +89,7 @@ def test_key_poses_are_kept_and_shown_of_the_others(locked: Editor) -> None:
     editor.commit("Move object")
     editor.keying.add()
     assert editor.keying.count == 2 and editor.keying.shown == 1
+    assert editor.message is not None and editor.message.text == "Key pose 2 is kept"
     editor.message = None
     for number in (0, 1):
         editor.keying.step(1)

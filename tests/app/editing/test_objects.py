@@ -21,7 +21,7 @@ from editor_steps import (
     wait_until,
 )
 from objectmorpher.canvas.frame import build_frame, drawn_order
-from objectmorpher.commands import COMMANDS, label_of, meaning_of, run, why_not
+from objectmorpher.commands import COMMANDS, label_of, meaning_of, next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
 from objectmorpher.editor.view import Shown, ToolName
@@ -131,6 +131,18 @@ def test_with_one_object_there_is_no_order(editor: Editor, ball: Document) -> No
     assert why_not(editor, "forward") == "There is no other object"
 
 
+def test_a_copy_is_announced_until_it_is_moved(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    editor.view.tool = ToolName.POSE
+    run(editor, "duplicate")
+    said = editor.message
+    assert said is not None and "lies exactly over the original" in said.text
+    editor.choose_tool(ToolName.PLACE)  # to drag it away
+    assert editor.message is said
+    editor.apply("Move object", edits.set_placement(ball, 0, Placement(move=(9.0, 0.0))))
+    assert editor.message is None
+
+
 def test_removing_the_copy_leaves_the_object_and_its_background(copied: Editor) -> None:
     run(copied, "remove_object")
     assert copied.document is not None
@@ -152,10 +164,30 @@ def test_hiding_takes_it_out_of_the_picture_by_a_command_too(
     assert editor.object is not None and editor.object.is_visible
 
 
+def test_what_is_taken_out_is_out_of_sight_and_the_picture_is_ready(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    editor.view.tool = ToolName.SELECT
+    assert next_step(editor) == ("Pose the object", "pose") and not editor.landing.is_current_gone
+    run(editor, "take_out")
+    assert editor.message is not None
+    assert editor.message.text == "Object 1 is taken out of the photo"
+    assert next_step(editor) == ("Export photo…", "export")
+    assert editor.landing.is_current_gone
+    editor.view.is_before = True
+    assert not editor.landing.is_current_gone, "the photo shows it"
+    editor.view.is_before = False
+    assert editor.message.action is not None
+    editor.message.action.run()
+    assert next_step(editor) == ("Pose the object", "pose") and not editor.landing.is_current_gone
+
+
 def test_taking_out_shows_the_background_and_putting_back_the_photo(
     copied: Editor, ball: Document
 ) -> None:
     assert label_of(copied, "remove_object") == "Discard object", "a copy is in no photo"
+    assert not copied.objects.is_to_be_taken_out
     assert meaning_of(copied, "remove_object") == ""
     run(copied, "remove_object")
     assert copied.history is not None and copied.history.undo_label == "Discard object"
@@ -164,6 +196,7 @@ def test_taking_out_shows_the_background_and_putting_back_the_photo(
     assert label_of(copied, "remove_object") == "Put back into the photo"
     told = [meaning_of(copied, name) for name in ("hide", "take_out", "remove_object")]
     assert all(told) and len(set(told)) == 3, "each is told apart from the others"
+    assert copied.objects.is_to_be_taken_out, "by the bin"
     run(copied, "take_out")
     assert copied.object is not None and not copied.object.is_visible
     assert copied.message is not None and copied.message.action is not None

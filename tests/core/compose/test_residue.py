@@ -26,6 +26,7 @@ from objectmorpher_core.compose.plate.plate import (
     plate_crop,
     plate_of_holes,
 )
+from objectmorpher_core.compose.plate.repair import Uncovering, refitted_plate
 from objectmorpher_core.compose.plate.residue import (
     find_ghosts,
     left_out,
@@ -345,6 +346,37 @@ def test_what_was_taken_out_of_a_selection_is_never_residue(footless: Document):
         np.testing.assert_array_equal(moved[foot], pixels[foot])
     gone = composite(edits.set_placement(footless, 0, away)).pixels
     assert (gone[foot] != pixels[foot]).any(-1).mean() > 0.8, "else it goes with its object"
+
+
+@pytest.mark.parametrize("stays", ["what is beside it", "all but its top"])
+def test_residue_leaves_the_plate_with_the_thing_that_left_it(stays: str):
+    """Where that is taken out of the selection later, as if it had never been in it."""
+    pixels, _, own = _scene("patch", "astronaut", "street")
+    thing, beside = _missing(own, "foot"), np.zeros_like(own)
+    rows, columns = np.flatnonzero(thing.any(1)), np.flatnonzero(thing.any(0))
+    beside[rows[0] : rows[0] + 60, columns[-1] - 10 : columns[-1] + 80] = True
+    before = thing | beside
+    after = before.copy()
+    if stays == "what is beside it":
+        after[thing & ~beside] = False
+    else:
+        after[: rows[0] + 20] = False
+    inpainter = compose.load("telea")
+    was, fresh = (build_plate(pixels, covered, inpainter) for covered in (before, after))
+    plate = refitted_plate(Uncovering(pixels, was, before, after), inpainter)
+    whole = (0, 0, WIDTH, HEIGHT)
+    hole, new, old = (crop(each.hole, each.box, whole) for each in (plate, fresh, was))
+    foot = own & old & (_away(before) > SEAM * MARGIN)
+    assert foot.sum() > 100, "there is something to be found"
+    shown, shown_before = (plate_crop(pixels, each, whole) for each in (plate, was))
+    np.testing.assert_array_equal(shown[~hole], pixels[~hole])
+    if stays == "what is beside it":
+        is_beside_it = _away(before & ~after) <= _away(after)
+        assert not (hole & ~new & (_away(after) > SEAM * MARGIN) & is_beside_it).any()
+        assert not (hole & foot).any()
+    else:
+        assert hole[foot].all()
+        np.testing.assert_array_equal(shown[foot], shown_before[foot])
 
 
 def test_what_is_only_selected_changes_no_pixel_of_the_edit(footless: Document):

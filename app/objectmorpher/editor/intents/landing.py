@@ -57,6 +57,13 @@ class Landing:
             return False
         return thing.is_moved and thing.is_visible and self.is_edit_shown
 
+    @property
+    def is_current_gone(self) -> bool:
+        """Whether the picture that is shown is without the current object."""
+        thing = self._editor.object
+        is_hidden = thing is not None and thing.lifted is not None and not thing.is_visible
+        return is_hidden and self.is_edit_shown
+
     def moved_at(self, canvas_xy: np.ndarray) -> int | None:
         """Index of the moved object that is seen at canvas px (2,); None where none is."""
         document = self._editor.document

@@ -37,6 +37,7 @@ class Objects:
         self.renaming: int | None = None  # whose name is being typed
         self.carried: int | None = None  # whose row is being dragged up or down the list
         self._hidden: StatusMessage | None = None  # that one is hidden, as it was said last
+        self._copied: StatusMessage | None = None  # that the current object is a copy
 
     def start_another(self) -> None:
         """The next click selects another object."""
@@ -108,13 +109,17 @@ class Objects:
         if document is None or not editor.is_lifted or editor.hand.is_busy:
             return
         editor.apply(t("Take out of the photo"), edits.set_visible(document, k, False))
-        self.say_hidden(k)
+        name = document.objects[k].name
+        self._say_unseen(t("{name} is taken out of the photo", name=name), k)
 
     def say_hidden(self, k: int) -> None:
         """That object `k` is hidden, with a button that shows it."""
         name = self._editor.opened.objects[k].name
+        self._say_unseen(t("{name} is hidden", name=name), k)
+
+    def _say_unseen(self, text: str, k: int) -> None:
         action = Action(t("Show object"), lambda: self.toggle_visible(k))
-        self._editor.say(t("{name} is hidden", name=name), action)
+        self._editor.say(text, action)
         self._hidden = self._editor.message
 
     def forget_lost(self) -> None:
@@ -153,6 +158,12 @@ class Objects:
             self._editor.say(
                 t("{name} lies exactly over the original · Drag it away", name=twin.name)
             )
+            self._copied = self._editor.message
+
+    @property
+    def is_copy_announced(self) -> bool:
+        """Whether it is said that a copy is to be dragged away, for which a tool may be chosen."""
+        return self._copied is not None and self._editor.message is self._copied
 
     @property
     def _is_in_photo(self) -> bool:
@@ -168,6 +179,14 @@ class Objects:
     def removing(self) -> str:
         """What removing the current object is called."""
         return t("Put back into the photo") if self._is_in_photo else t("Discard object")
+
+    @property
+    def is_to_be_taken_out(self) -> bool:
+        """Whether a bin takes the current object out of the picture: it is lifted off the photo.
+
+        What is no part of the photo, or only selected, is dropped from the list instead.
+        """
+        return self._editor.is_lifted and self._is_in_photo
 
     def remove(self) -> None:
         """The current object is not edited any more: the photo shows it as it was."""

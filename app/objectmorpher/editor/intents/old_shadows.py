@@ -25,7 +25,7 @@ from ...canvas.memo import same
 from ...system.texts import t
 from ...worker import job_functions
 from ...worker.job_functions import Cutout
-from ..view import Action, ToolName
+from ..view import Action, StatusMessage, ToolName
 from .composing import Answers, masks_of, seen_from
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ class OldShadows:
         self._editor, self._composing, self._choose_tool = editor, composing, choose_tool
         self._answers = Answers(editor)
         self._offer: ShadowOffer | None = None  # found in the photo, not taken along yet
+        self._said: StatusMessage | None = None  # that it is outlined
         self._watched: tuple[Document | None, int] = (None, 0)  # looked at last
         self._looked_for: WeakSet[Matte] = WeakSet()  # whose shadows were looked for unasked
 
@@ -101,7 +102,7 @@ class OldShadows:
 
     def poll(self) -> bool:
         """Takes in what was found, and looks what was moved; once a frame."""
-        return self._answers.deliver() | self._watch()
+        return self._answers.deliver() | self._watch() | self._fall_silent()
 
     @property
     def offer(self) -> ShadowOffer | None:
@@ -192,6 +193,18 @@ class OldShadows:
         )  # fmt: skip
         return True
 
+    def _fall_silent(self) -> bool:
+        """Says no longer that a shadow is outlined once none is. Whether it was said."""
+        editor, said = self._editor, self._said
+        if said is None or self.offer is not None:
+            return False
+        if editor.hand.is_busy or editor.preview is not None:  # it may be taken back
+            return False
+        self._said, is_said = None, editor.message is said
+        if is_said:
+            editor.message = None
+        return is_said
+
     def _may_leave_one(self, item: EditObject, document: Document) -> bool:
         from objectmorpher_core.scripting.runner import has_left
 
@@ -199,7 +212,9 @@ class OldShadows:
             return False
         if item.shadow.strength > 0:
             return False
-        if not has_left(item, document):  # it is back: what is moved then is a new move
+        alike = (o for o in document.objects if o.matte is item.matte)
+        if not all(has_left(o, document) for o in alike):  # one stands in its shadow in the photo
+            # What leaves it last is a new move.
             self._looked_for.discard(item.matte)
             return False
         return item.matte not in self._looked_for
@@ -224,6 +239,7 @@ class OldShadows:
             return
         self._offer = offer
         editor.say(t("What is outlined is its shadow, and stays behind"), offer.action)
+        self._said = editor.message
 
     def _show(self, masks: tuple[Mask | None, ...], offer: ShadowOffer) -> None:
         """Offers what the artist has asked for."""
@@ -234,6 +250,7 @@ class OldShadows:
         self._choose_tool(ToolName.COMPOSE)  # which outlines it
         text = t("What is outlined is its shadow, and would go along")
         editor.say(text, Action(t("Leave it in the photo"), self.refuse))
+        self._said = editor.message
 
 
 def _offer_of(document: Document, k: int, answer: tuple[Shadow, Plate]) -> ShadowOffer:

@@ -11,6 +11,7 @@ from ...editor.intents.landing import Of
 from ...editor.view import Composed
 from ...system.texts import t
 from ..widgets.theme import theme
+from ..window.landmarks import mark_on_canvas
 from .canvas import ACCENT, WHITE, CanvasPainter
 
 BARB = 10.0  # points, of an arrow
@@ -20,7 +21,6 @@ SOURCE = 6.0  # points, radius of the mark from where is cloned
 def draw_compose(canvas: CanvasPainter) -> None:
     """Draw the Compose tool's brush and note over the photo."""
     editor = canvas.editor
-    draw_offered_shadow(canvas)
     if editor.view.compose.is_painting:
         if editor.pointer is not None and editor.is_on_photo(editor.pointer.xy):
             canvas.brush(editor.pointer.alt)
@@ -49,7 +49,9 @@ def draw_offered_shadow(canvas: CanvasPainter) -> None:
     editor = canvas.editor
     if (offer := editor.old_shadows.offer) is not None:
         for outline in editor.derived.contours(offer.outlined):
-            canvas.dashes(canvas.at(outline))
+            at = canvas.at(outline)
+            mark_on_canvas("Offered shadow", at[0], at[0])
+            canvas.dashes(at)
 
 
 def _draw_owner(canvas: CanvasPainter) -> None:

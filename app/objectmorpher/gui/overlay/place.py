@@ -14,7 +14,6 @@ from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, ghost, gizmo
 from ..widgets.theme import theme
 from ..window.landmarks import mark_on_canvas
 from .canvas import ACCENT, DARK, WHITE, CanvasPainter
-from .compose import draw_offered_shadow
 from .select import draw_other
 
 MARKED = {"yaw": 3.8, "pitch": -0.9, "roll": 3.9}  # rad, on the front of each ring, off the others
@@ -37,7 +36,6 @@ def draw_frame(canvas: CanvasPainter) -> None:
     draw_other(canvas)
     if editor.object.is_locked or not editor.object.is_visible:
         return
-    draw_offered_shadow(canvas)
     for line in ghost(editor):
         canvas.dashes(canvas.at(line), WHITE)
     if shown.horizon is not None:

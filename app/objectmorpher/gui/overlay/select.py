@@ -18,14 +18,25 @@ DOT = 1.4  # points, their radius
 def draw_selection(canvas: CanvasPainter) -> None:
     """Draw the Select tool's selection and clicks."""
     editor = canvas.editor
-    draw_edge(canvas)
+    if not editor.landing.is_current_gone:
+        draw_edge(canvas)
+        _draw_prompt(canvas)
     candidate, share = fades.shown("candidate", editor.candidates.shown)
     document = editor.document
     if candidate is not None and document is not None and candidate.photo is document.photo:
         color = WARM if candidate.takes_away else WHITE
         for outline in editor.derived.contours(candidate.changed):
             _draw_dots(canvas, outline, color, share)
-    prompt = editor.selection.prompt
+    draw_other(canvas)
+    if editor.rubber is not None:
+        draw_rubber(canvas)
+    if editor.selection.path is not None:
+        _draw_lasso(canvas, editor.selection.path)
+
+
+def _draw_prompt(canvas: CanvasPainter) -> None:
+    """The box and the clicks that made the selection."""
+    editor, document, prompt = canvas.editor, canvas.editor.document, canvas.editor.selection.prompt
     if prompt.box is not None:
         x0, y0, x1, y1 = prompt.box
         if not editor.landing.is_current_moved:
@@ -35,11 +46,6 @@ def draw_selection(canvas: CanvasPainter) -> None:
         if editor.landing.is_current_moved and document is not None and click.is_foreground:
             place = editor.derived.carried(document, editor.current, place)
         _draw_click(canvas, canvas.at(place)[0], click.is_foreground)
-    draw_other(canvas)
-    if editor.rubber is not None:
-        draw_rubber(canvas)
-    if editor.selection.path is not None:
-        _draw_lasso(canvas, editor.selection.path)
 
 
 def draw_edge(canvas: CanvasPainter) -> None:

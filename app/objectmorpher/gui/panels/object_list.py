@@ -36,7 +36,6 @@ EYE = 32.0  # from the eye's left to the row's right, and from the lock's to it
 NAME = 34.0  # from the row's left to the name
 BUTTONS = (
     (Icon.UP, "forward"), (Icon.DOWN, "backward"), (Icon.COPY, "duplicate"),
-    (Icon.TRASH, "remove_object"),
 )  # fmt: skip
 FOLD = (Icon.SPLIT, "panel")  # where the button was that unfolded it: a second click folds it
 
@@ -83,7 +82,8 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
     """At the right what can be done with the current object."""
     top = imgui.get_cursor_pos_y()
     heading(t("Objects"))
-    buttons = (*(BUTTONS if has_buttons else ()), *((FOLD,) if _is_in_the_way() else ()))
+    bin_ = (Icon.TRASH, "take_out" if editor.objects.is_to_be_taken_out else "remove_object")
+    buttons = (*((*BUTTONS, bin_) if has_buttons else ()), *((FOLD,) if _is_in_the_way() else ()))
     if not buttons:
         return
     end, gap = imgui.get_content_region_avail().x + imgui.get_cursor_pos_x(), theme.pt(2)

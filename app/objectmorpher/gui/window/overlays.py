@@ -13,7 +13,7 @@ from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.view import Popup, PoseMode, Shown, ToolName
 from ...system.texts import t
 from ..overlay.canvas import CanvasPainter, draw_comparison, draw_look, draw_pixel_grid
-from ..overlay.compose import draw_compose
+from ..overlay.compose import draw_compose, draw_offered_shadow
 from ..overlay.legend import Legend
 from ..overlay.place import draw_frame
 from ..overlay.pose import draw_control_points, draw_pose
@@ -42,6 +42,8 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
         mark_on_canvas("Photo", *canvas.at(np.array([(0, 0), editor.photo_size], np.float64)))
     draw_pixel_grid(canvas)
     if not view.is_before:
+        if editor.looking.orbit is None:
+            draw_offered_shadow(canvas)
         if view.has_points and editor.is_lifted and editor.looking.orbit is None:
             draw_control_points(canvas)
         if editor.is_lifted or view.tool in OF_THE_PHOTO:
