@@ -27,7 +27,7 @@ from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
 from ..raster.reference import Picture3D
-from ..raster.texture import TextureRows
+from ..raster.texture import TextureLevels, TextureRows
 from .blend import FEATHER_START as FEATHER_START
 from .blend import (
     NEAR,
@@ -199,7 +199,7 @@ class _Drawing:
             if (paint := PaintedShare.of(things[k].matte, shown.splats.rest.lifted)) is not None
         }
         self._textures = {
-            k: _Carried(things[k].matte, things[k].item.lifted, shown)
+            k: CarriedTexture(things[k].matte, things[k].item.lifted, shown)
             for k, shown in self._drawables.items()
         }
         self.box = self._region(camera)
@@ -320,20 +320,24 @@ class _Drawing:
         return _part(soft, top - above, bottom - above)
 
 
-class _Carried:
-    """A drawable object with its texture, of which a large one is there only by rows."""
+class CarriedTexture:
+    """The texture of a drawable object, of which a large one is there only by rows."""
 
     def __init__(self, matte: Matte, lifted: LiftedObject | None, shown: tiles.Drawable) -> None:
         source, self._shown = texture_source(matte, lifted), shown
         is_large = source.shape[0] * source.shape[1] > LARGE
         self._texture = TextureRows(source) if is_large else source.levels()
 
-    def draw(self, box: Box) -> Picture3D:
-        """The part `box` of the view."""
+    def seen_in(self, box: Box) -> TextureLevels:
+        """The texture, to be looked at in a part `box` of the view only, until the next call."""
         texture = self._texture
         if isinstance(texture, TextureRows):
-            texture = texture.looked_at(*self._shown.rows_looked_at(box))
-        return tiles.draw(self._shown, texture, box)
+            return texture.looked_at(*self._shown.rows_looked_at(box))
+        return texture
+
+    def draw(self, box: Box) -> Picture3D:
+        """The part `box` of the view."""
+        return tiles.draw(self._shown, self.seen_in(box), box)
 
 
 def _pieces(top: int, bottom: int) -> list[tuple[int, int]]:

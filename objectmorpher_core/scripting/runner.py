@@ -14,7 +14,7 @@ from .. import compose, lift, segment
 from ..base.files import read_input
 from ..base.progress import Progress, part, silent
 from ..compose import refine
-from ..compose.composite import composite, object_texture
+from ..compose.composite import CarriedTexture, composite
 from ..compose.order import holes, reordered
 from ..compose.plate.plate import erased_beside, plate_cover
 from ..compose.refine import refinement
@@ -36,6 +36,7 @@ from ..document.settings import DeformSettings, Hint, Shadow
 from ..document.transparency import continued, with_opacity
 from ..lift.workers.file import worker_names
 from ..pictures.image import naming, read_mask
+from ..raster import tiles
 from ..raster.trust import SIGNS, trust_in
 from .background import LIGHT, LIGHT_LIFTERS, PlateAhead, PlateTask, ShadowCaster
 from .options import FINISH, EditScript, ScriptError, options_of, said_by
@@ -290,14 +291,19 @@ def _put(document: Document, k: int, placement: Placement, script: EditScript) -
 
 
 def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript) -> Document:
+    if not script.pin and not script.handle:
+        return document
     lifted, camera = puppet.lifted, document.photo.camera
     matte = document.objects[k].matte
     assert matte is not None
-    texture = object_texture(matte, lifted)
+    drawable = tiles.prepare(puppet.posed(None, Placement()), camera, camera)
+    texture = CarriedTexture(matte, lifted, drawable)
 
     def pick(xy: tuple[float, float], option: str) -> Any:
         _check_within(document.photo.size, xy, option)
-        point = puppet.pick(xy, None, Placement(), texture)
+        x, y = int(xy[0]), int(xy[1])
+        seen = texture.seen_in((x - 1, y - 1, x + 2, y + 2))
+        point = puppet.pick_in(drawable, seen, xy, None, Placement())
         if point is None:
             raise ScriptError(f"{option} {xy[0]:g},{xy[1]:g} misses the object")
         return point

@@ -8,7 +8,7 @@ import pytest
 
 from hands import opened
 from objectmorpher.editor.view import StatusMessage
-from objectmorpher.gui.window.status import GLANCE, PER_CHARACTER, Reading
+from objectmorpher.gui.window.status import GLANCE, PER_CHARACTER, StatusReading
 
 HINT = "Click an object, or drag a box around it"
 SAID = StatusMessage("Saved ball.omorph in Pictures")
@@ -16,7 +16,7 @@ ENOUGH = GLANCE + PER_CHARACTER * len(SAID.text)
 
 
 def test_a_message_is_over_once_there_was_time_to_read_it() -> None:
-    reading = Reading()
+    reading = StatusReading()
     assert not reading.is_over(SAID, (5.0, 5.0), 100.0)
     assert not reading.is_over(SAID, (6.0, 5.0), 101.0)
     assert not reading.is_over(SAID, (9.0, 9.0), 101.0 + 0.99 * ENOUGH)
@@ -24,7 +24,7 @@ def test_a_message_is_over_once_there_was_time_to_read_it() -> None:
 
 
 def test_a_message_waits_for_somebody_to_come_back() -> None:
-    reading = Reading()
+    reading = StatusReading()
     for now in (0.0, ENOUGH, 3600.0):
         assert not reading.is_over(SAID, (5.0, 5.0), now), "nobody has moved"
     assert not reading.is_over(SAID, (6.0, 5.0), 3601.0)
@@ -32,7 +32,7 @@ def test_a_message_waits_for_somebody_to_come_back() -> None:
 
 
 def test_another_message_begins_anew_and_none_is_never_over() -> None:
-    reading = Reading()
+    reading = StatusReading()
     for x, now in enumerate((0.0, 1.0, 2.0 * ENOUGH)):
         reading.is_over(SAID, (float(x), 0.0), now)
     again = StatusMessage(SAID.text)

@@ -7,7 +7,8 @@ import pytest
 
 from objectmorpher_core import pipeline, segment
 from objectmorpher_core.base.progress import Cancelled
-from objectmorpher_core.compose.composite import object_texture, straight_cutout
+from objectmorpher_core.compose import composite as composite_module
+from objectmorpher_core.compose.composite import CarriedTexture, object_texture, straight_cutout
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Placement
@@ -22,6 +23,8 @@ from objectmorpher_core.pipeline import (
     run_script,
     select,
 )
+from objectmorpher_core.raster import texture as texture_module
+from objectmorpher_core.scripting import runner
 from objectmorpher_core.scripting.options import EditScript, ScriptError, script_from
 from tests import shapes
 from tests.tree import quick
@@ -147,6 +150,33 @@ def test_a_pin_stays_where_it_is():
             )
             assert np.abs(at - now).max() < 1e-3
     assert sum(h.is_pin for h in item.handles) == 2
+
+
+def test_of_a_large_photo_the_same_is_picked(monkeypatch):
+    """There the texture is filled only in the rows about the pixel that is picked."""
+    asked = {"handle": [{"at": [110, 62], "to": [120, 30]}], "pin": [[50, 62], [78, 62], [78, 45]]}
+    usual = _run(**asked).document.objects[0].handles
+    monkeypatch.setattr(composite_module, "LARGE", 1000)
+    monkeypatch.setattr(texture_module, "STRIP", 4)
+    large = _run(**asked).document.objects[0].handles
+    assert len(large) == len(usual) == 4
+    for one, other in zip(large, usual, strict=True):
+        np.testing.assert_allclose(one.point, other.point, atol=1e-6)
+
+
+def test_only_what_is_picked_needs_a_texture(monkeypatch):
+    """That of 100 megapixels would take 2 GiB beside the fill of the background."""
+    made = []
+
+    def counted(*args: object) -> CarriedTexture:
+        made.append(args)
+        return CarriedTexture(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(runner, "CarriedTexture", counted)
+    _run(move=[5, 0])
+    assert not made
+    _run(pin=[[78, 62]])
+    assert len(made) == 1
 
 
 def test_pins_alone_are_no_edit():

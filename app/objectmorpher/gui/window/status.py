@@ -28,7 +28,7 @@ PER_CHARACTER = 0.06  # s, in which one of them is read
 Places = tuple[float, ...]  # of the pointer, in whatever units
 
 
-class Reading:
+class StatusReading:
     """Whether the message that is shown has been read, so that the hint has the line again.
 
     The time runs from when the pointer first moves: before that, somebody may have gone for a
@@ -52,7 +52,7 @@ class Reading:
         return self._began is not None and now - self._began >= needed
 
 
-_reading = Reading()
+_reading = StatusReading()
 
 
 def draw_status(editor: Editor, rect: Rect, hint: str) -> None:
