@@ -151,6 +151,7 @@ def _turn_cup(guide: Guide) -> None:
     guide.pull("Strength", 90)
     guide.shoot("Compose", "A shadow on the table, its direction on a dial.")
     guide.press("b")
+    guide.rewind()
     guide.choose("Try 3 variants")
     guide.settle()
     guide.point(guide.at(560, 200))
