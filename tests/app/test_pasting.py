@@ -98,7 +98,9 @@ def test_it_goes_back_to_where_it_came_in(pasted: Editor) -> None:
     pasted.placing.move_to(Placement((40.0, -9.0), 0.3, (70.0, 0.0, 5.0), 0.5))
     pasted.commit("Move")
     run(pasted, "reset_position")
-    assert pasted.placing.placement == replace(start, turn=(70.0, 0.0, 5.0), scale=0.5)
+    back = replace(start, turn=(70.0, 0.0, 5.0), scale=0.5)
+    assert pasted.placing.placement == pasted.placing.stood(back)  # on its ground, as it is now
+    assert pasted.placing.placement.move[0] == pytest.approx(start.move[0])
     run(pasted, "reset_place")
     assert pasted.placing.placement == start
 

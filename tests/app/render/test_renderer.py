@@ -135,7 +135,7 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     document = edits.set_plate(document, make_plate(dark, plate_cover(document), "telea"))
     place = Placement(move=(30.0, -8.0), scale=0.8, turn=(35.0, 0.0, 0.0))
     document = edits.set_share(edits.set_placement(document, 0, place), 0, "relight", 1.0)
-    document = edits.set_shadow(document, 0, Shadow(strength=0.7, length=1.2))
+    document = edits.set_shadow(document, 0, Shadow(strength=1.0, length=1.2))
     document = edits.set_feather(edits.set_share(document, 0, "harmony", 1.0), 1.5)
     document = edits.set_finish(document, 0, Finish(0.7, -0.3, 0.2, 0.5))
     cache, view = Cache(), _view()

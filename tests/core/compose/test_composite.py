@@ -398,7 +398,7 @@ def test_a_texture_is_there_by_rows_from_its_area_on(monkeypatch):
     height, width = texture_source(scene.matte, scene.lifted).shape
     for most, is_by_rows in ((height * width - 1, True), (height * width, False)):
         monkeypatch.setattr(composite_module, "LARGE", most)
-        carried = composite_module._Carried(scene.matte, scene.lifted, shown)
+        carried = composite_module.CarriedTexture(scene.matte, scene.lifted, shown)
         assert isinstance(carried._texture, TextureRows) == is_by_rows
 
 
