@@ -19,11 +19,10 @@ class Keying:
     def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor, self._posing = editor, posing
         self._last = 0
-        self.is_just_added = False  # until the panel has shown the new one
 
     def forget(self) -> None:
         """Another document is shown."""
-        self._last, self.is_just_added = 0, False
+        self._last = 0
 
     @property
     def count(self) -> int:
@@ -62,7 +61,6 @@ class Keying:
             self._last = self.count
             self._editor.apply(t("Add key pose"), key_edits.add_key(document))
             self._editor.say(t("Key pose {number} is kept", number=self.count))
-            self.is_just_added = True
 
     def show(self, number: int) -> None:
         """Put the objects into a key pose, but for those that are locked."""

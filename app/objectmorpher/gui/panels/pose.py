@@ -334,10 +334,6 @@ def draw_timeline(editor: Editor) -> None:
             )
         imgui.same_line()
         command_button(editor, "remove_key", t("Remove"), half)
-        if editor.keying.is_just_added:
-            editor.keying.is_just_added = False
-            if imgui.get_item_rect_max().y > imgui.get_window_pos().y + imgui.get_window_height():
-                imgui.set_scroll_here_y(1.0)
     if editor.keying.count < 2:
         note(t("Keep two poses or more: a video can show the way from one to the next."))
 

@@ -175,8 +175,8 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
         if message is editor.message and (message.is_error or message.action is not None):
             _draw_buttons(editor, message)
         imgui.same_line(0, theme.pt(BESIDE))
-        imgui.set_cursor_pos_y(_line_y(rect))
         if shown := _whole_parts(hint, right - imgui.get_cursor_pos_x()):
+            imgui.set_cursor_pos_y(_line_y(rect))
             _draw_hint(shown)
     imgui.pop_clip_rect()
 
