@@ -15,14 +15,13 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import Lighting
-from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.compose.refine import refinement
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement, Prompt
-from objectmorpher_core.document.transparency import STEP, colours_of, continued, seen
-from objectmorpher_core.pictures.image import Picture, array_of, encode_picture
-from objectmorpher_core.pipeline import lift_mask, make_plate
+from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement
+from objectmorpher_core.document.transparency import STEP, colours_of, seen
+from objectmorpher_core.pictures.image import Picture, array_of
 from objectmorpher_core.scripting.runner import coarse_edit
+from tests.core.compose.test_transparency import lifted
 from tests.photos import photo
 
 SIZE = 240, 160  # px
@@ -64,24 +63,14 @@ def _picture(ground: Pixels, there: Mask, hidden: str) -> Picture:
     return Picture(pixels, np.where(there, 255, 0).astype(np.uint8))
 
 
-def _lifted(picture: Picture) -> Document:
-    camera = Camera.from_fov(*SIZE, 2.0)
-    document = Document(Photo(picture, camera, encode_picture(picture, ".png"), "cut.png"))
-    document = edits.set_mask(edits.add_object(document), 0, ITEM, Prompt())
-    selection = document.objects[0].selection
-    assert selection is not None
-    made = lift_mask(picture.pixels, camera, selection, "relief", SHAPE)
-    document = edits.set_lifted(document, 0, *made)
-    covered = plate_cover(document)
-    return edits.set_plate(document, make_plate(continued(picture, covered), covered, "telea"))
-
-
 @cache
 def _alike(where: str, is_smooth: bool = False) -> tuple[Document, ...]:
     """The same edit of photos that look alike and hide other colours."""
     ground, there = _smooth() if is_smooth else SMALL, np.broadcast_to(SHOWN[where], ITEM.shape)
     pictures = [_picture(ground, there, hidden) for hidden in HIDDEN]
-    first = edits.set_placement(_lifted(pictures[0]), 0, Placement(move=(90.0, 20.0), scale=0.7))
+    first = edits.set_placement(
+        lifted(pictures[0], ITEM), 0, Placement(move=(90.0, 20.0), scale=0.7)
+    )
     return tuple(replace(first, photo=replace(first.photo, picture=own)) for own in pictures)
 
 

@@ -74,7 +74,7 @@ def _cut_out(kind: str) -> tuple[Picture, np.ndarray]:
     return Picture(pixels, levels, is_grey=is_grey), mask
 
 
-def _lifted(picture: Picture, mask: np.ndarray) -> Document:
+def lifted(picture: Picture, mask: np.ndarray) -> Document:
     """Lifted as seen from afar, so that what moves is only moved; with its background."""
     camera = Camera.from_fov(*mask.shape[::-1], 2.0)
     document = Document(Photo(picture, camera, encode_picture(picture, ".png"), "cut.png"))
@@ -89,7 +89,7 @@ def _lifted(picture: Picture, mask: np.ndarray) -> Document:
 
 @cache
 def _scene(kind: str) -> Document:
-    return _lifted(*_cut_out(kind))
+    return lifted(*_cut_out(kind))
 
 
 def _moved(document: Document, move: tuple[int, int] = MOVE) -> Document:
@@ -133,7 +133,7 @@ def test_no_black_comes_into_a_soft_edge(kind: str):
     assert alpha is not None
     light[alpha == 0] = 0
     picture = replace(document.photo.picture, pixels=light)
-    result = composite(_moved(_lifted(picture, _cut_out(kind)[1])))
+    result = composite(_moved(lifted(picture, _cut_out(kind)[1])))
     assert result.alpha is not None
     top = np.iinfo(alpha.dtype).max
     soft = (result.alpha > 0.1 * top) & (result.alpha < 0.9 * top)
@@ -161,7 +161,7 @@ def test_colours_under_clear_ground_stay_beside_the_edit():
     hidden = np.repeat(np.array([0, 90, 255], np.uint8), SIZE[0] // 3)[:, None]
     pixels = np.where(picture.alpha[..., None] > 0, picture.pixels, hidden)
     picture = replace(picture, pixels=pixels)
-    result = composite(_moved(_lifted(picture, mask)))
+    result = composite(_moved(lifted(picture, mask)))
     assert result.alpha is not None
     far = ~result.footprint | ((result.alpha == 0) & (picture.alpha == 0))
     assert far.any() and np.array_equal(result.pixels[far], pixels[far])
@@ -176,7 +176,7 @@ def _beside_clear_ground() -> Document:
     is_clear = np.broadcast_to(np.arange(SIZE[0]) >= 175, mask.shape)
     pixels = cv2.resize(photo("chelsea"), SIZE, interpolation=cv2.INTER_AREA)
     pixels = np.where(is_clear[..., None], np.uint8([255, 0, 255]), pixels)
-    return _lifted(Picture(pixels, np.where(is_clear, 0, 255).astype(np.uint8)), mask)
+    return lifted(Picture(pixels, np.where(is_clear, 0, 255).astype(np.uint8)), mask)
 
 
 def _magenta(document: Document) -> int:
@@ -216,7 +216,7 @@ def test_behind_an_object_the_alpha_around_it_goes_on():
     pixels = cv2.resize(photo("coffee"), SIZE, interpolation=cv2.INTER_AREA)
     _, mask = _cut_out("hard")
     alpha = np.where((np.arange(SIZE[0]) < 0.45 * SIZE[0]) | mask, 255, 0).astype(np.uint8)
-    result = composite(_moved(_lifted(Picture(pixels, alpha), mask), (400, 0)))
+    result = composite(_moved(lifted(Picture(pixels, alpha), mask), (400, 0)))
     assert result.alpha is not None
     rows = np.flatnonzero(mask.any(1))
     middle = result.alpha[rows[0] : rows[-1]]
@@ -236,7 +236,7 @@ def test_over_other_things_an_object_lies_as_glass_does():
     pixels = document.photo.pixels.copy()
     pixels[:60, 140:] = (0, 0, 200)
     picture = replace(document.photo.picture, pixels=pixels, alpha=opaque)
-    moved = composite(_moved(_lifted(picture, _cut_out("seen through")[1]), (60, -55)))
+    moved = composite(_moved(lifted(picture, _cut_out("seen through")[1]), (60, -55)))
     assert moved.alpha is not None
     assert (moved.alpha[5:50, 150:230] == 255).all(), "no hole in what lies below"
     changed = (moved.pixels[5:50, 150:230] != pixels[5:50, 150:230]).any(-1)
@@ -259,7 +259,7 @@ def test_an_opaque_alpha_channel_changes_nothing():
     _, mask = _cut_out("hard")
     pixels = cv2.resize(photo("chelsea"), SIZE, interpolation=cv2.INTER_AREA)
     with_alpha, without = (
-        composite(_moved(_lifted(Picture(pixels, alpha), mask)))
+        composite(_moved(lifted(Picture(pixels, alpha), mask)))
         for alpha in (np.full(mask.shape, 255, np.uint8), None)
     )
     assert without.alpha is None
@@ -316,7 +316,7 @@ def _half_clear() -> Document:
     ground = np.repeat(np.array([255, 128, 0], np.uint8), SIZE[0] // 3)
     alpha = np.where(mask, 255, ground).astype(np.uint8)
     pixels = cv2.resize(photo("coffee"), SIZE, interpolation=cv2.INTER_AREA)
-    return _lifted(Picture(pixels, alpha), mask)
+    return lifted(Picture(pixels, alpha), mask)
 
 
 @pytest.mark.parametrize("mode", MODES)

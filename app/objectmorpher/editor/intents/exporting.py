@@ -375,8 +375,10 @@ class Exporting:
         return draft if draft.format in known else replace(draft, format=usual)
 
     def _as_last(self, draft: Draft) -> Draft:
-        """Films and layers have the format of the last ones, at first that of one file, and never
-        the photo's: PNG files in a folder."""
+        """Give films and layers the format of the last ones, and never the photo's.
+
+        The first ones have that of one file: a PNG photo's would be a folder of PNG files.
+        """
         settings = self._editor.settings
         lasts = {What.VIDEO: settings.export_film, What.LAYERS: settings.export_layers}
         if draft.what not in lasts or self._draft.what is draft.what:
