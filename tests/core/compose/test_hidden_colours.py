@@ -17,7 +17,7 @@ from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import Lighting
 from objectmorpher_core.compose.refine import refinement
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, LiftSettings, Photo, Placement
+from objectmorpher_core.document.model import Document, Photo, Placement
 from objectmorpher_core.document.transparency import STEP, colours_of, seen
 from objectmorpher_core.pictures.image import Picture, array_of
 from objectmorpher_core.scripting.runner import coarse_edit
@@ -25,7 +25,6 @@ from tests.core.compose.test_transparency import lifted
 from tests.photos import photo
 
 SIZE = 240, 160  # px
-SHAPE = LiftSettings(8000, trust=0)  # what it is does not matter here: no network tells it
 RNG = np.random.default_rng(3)
 SMALL = cv2.resize(photo("coffee"), SIZE, interpolation=cv2.INTER_AREA)
 HIDDEN = {
